@@ -1,0 +1,54 @@
+"""colift: several multirotors carry one load on cables - allocate, control, simulate, judge."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from colift.allocation.base import Allocation, Allocator, Status
+    from colift.allocation.sqp import SqpAllocator
+    from colift.errors import ColiftError, MissionError
+    from colift.mission import Mission, load_mission
+    from colift.recording import Recording
+    from colift.run import Run, run
+    from colift.team import Team
+
+# Resolved on first use: importing a kernel's module loads (the first time: compiles) it.
+_HOMES = {
+    "Allocation": "colift.allocation.base",
+    "Allocator": "colift.allocation.base",
+    "ColiftError": "colift.errors",
+    "Mission": "colift.mission",
+    "MissionError": "colift.errors",
+    "Recording": "colift.recording",
+    "Run": "colift.run",
+    "SqpAllocator": "colift.allocation.sqp",
+    "Status": "colift.allocation.base",
+    "Team": "colift.team",
+    "load_mission": "colift.mission",
+    "run": "colift.run",
+}
+
+__all__ = [
+    "Allocation",
+    "Allocator",
+    "ColiftError",
+    "Mission",
+    "MissionError",
+    "Recording",
+    "Run",
+    "SqpAllocator",
+    "Status",
+    "Team",
+    "load_mission",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'colift' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value

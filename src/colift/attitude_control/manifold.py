@@ -1,0 +1,54 @@
+"""The paper's attitude law: error manifold with a saturated robust term (paper eqs. 11 to 13)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.attitude_control.base import SIGNATURE, AttitudeControlPart
+from colift.jit import kernel
+from colift.math import quaternion
+from colift.part import Vector
+from colift.team import Team
+
+Gain = Annotated[float, Field(gt=0.0)]
+
+
+@kernel(SIGNATURE)
+def _manifold(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: ignore[no-untyped-def]
+    rho = params[0:3]
+    K_d = params[3:6]
+    beta = params[6:9]
+    gamma = params[9:12]
+    for i in range(q.shape[0]):
+        w, ex, ey, ez = quaternion.multiply(
+            q_d[i, 0], -q_d[i, 1], -q_d[i, 2], -q_d[i, 3], q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        )
+        # q and -q are one attitude: take the short way round.
+        sign = -1.0 if w < 0.0 else 1.0
+        q_e = (sign * ex, sign * ey, sign * ez)
+        for k in range(3):
+            # s_i = Omega_ie + rho_i q_ie;  tau_i = -K_di s_i - beta_i sat(gamma_i s_i)
+            s = Omega[i, k] - Omega_d[i, k] + rho[k] * q_e[k]
+            saturated = min(max(gamma[k] * s, -1.0), 1.0)
+            tau[i, k] = -K_d[k] * s - beta[k] * saturated
+
+
+class Manifold(AttitudeControlPart):
+    """``s = Omega_e + rho q_e``, ``tau = -K_d s - beta sat(gamma s)``; all gains unpublished, chosen."""
+
+    kernel = _manifold
+
+    rho: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
+    """Slope of the error manifold per body axis, 1/s."""
+    k_d: tuple[Gain, Gain, Gain] = (2.0, 2.0, 2.0)
+    """Damping gain per body axis, N m s."""
+    beta: tuple[Gain, Gain, Gain] = (0.1, 0.1, 0.1)
+    """Size of the robust term per body axis, N m."""
+    gamma: tuple[Gain, Gain, Gain] = (10.0, 10.0, 10.0)
+    """Slope of the saturation, s."""
+
+    def params(self, team: Team) -> Vector:
+        return np.array([*self.rho, *self.k_d, *self.beta, *self.gamma])

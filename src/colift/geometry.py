@@ -1,0 +1,55 @@
+"""Cable geometry in plain NumPy: formations, angles, attitudes. For set-up and analysis only."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def ring(n: int, cone: float, *, heading: float = 0.0) -> Array:
+    """Directions (n, 3) of n cables evenly on a cone of half-angle ``cone`` (rad) about the vertical.
+
+    Unit vectors from drone to load; the first drone stands at azimuth ``heading`` (rad). One cable
+    hangs straight down.
+    """
+    if n == 1:
+        return np.array([[0.0, 0.0, -1.0]])
+    azimuth = heading + 2.0 * np.pi * np.arange(n) / n
+    return -np.column_stack(
+        [np.sin(cone) * np.cos(azimuth), np.sin(cone) * np.sin(azimuth), np.full(n, np.cos(cone))]
+    )
+
+
+def pairwise_angles(directions: Array) -> Array:
+    """Angles (..., n(n-1)/2) between all pairs of cables, rad, from directions (..., n, 3)."""
+    i, j = np.triu_indices(directions.shape[-2], k=1)
+    a, b = directions[..., i, :], directions[..., j, :]
+    # atan2 keeps full accuracy near 0 and pi, where arccos loses half of the digits.
+    cross = np.linalg.norm(np.cross(a, b), axis=-1)
+    return np.asarray(np.arctan2(cross, np.sum(a * b, axis=-1)))
+
+
+def min_norm_tensions(directions: Array, force: ArrayLike) -> Array:
+    """Tensions (n,) of least norm with ``sum T_i alpha_i = -force``, N; may be negative."""
+    wanted = -np.asarray(force, dtype=float)
+    solution = np.linalg.lstsq(directions.T, wanted, rcond=None)[0]
+    return np.asarray(solution)
+
+
+def zero_yaw_quaternion(thrust_direction: Array) -> Array:
+    """Attitude (..., 4), wxyz, that turns e3 into the unit ``thrust_direction`` (..., 3) without yaw.
+
+    Paper section 2.4; undefined for a direction straight down.
+    """
+    root = np.sqrt(2.0 * thrust_direction[..., 2] + 2.0)
+    return np.stack(
+        [
+            0.5 * root,
+            -thrust_direction[..., 1] / root,
+            thrust_direction[..., 0] / root,
+            np.zeros_like(root),
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,85 @@
+"""How kernels are compiled: one decorator, the array types of the kernel signatures, a clock.
+
+A *kernel* takes arrays and numbers, writes its results into arrays of the caller, and returns
+nothing or a status code. It allocates nothing and raises nothing. Kernels carry an explicit
+signature, one for every implementation of a layer, so that the simulation loop can take them as
+first-class functions and still be cached between processes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+JIT_ENABLED: bool = not bool(numba.config.DISABLE_JIT)
+
+f8 = types.float64
+i8 = types.int64
+void = types.void
+vector = types.float64[::1]
+matrix = types.float64[:, ::1]
+mask = types.boolean[::1]
+
+# `contract` lets a*b + c become one fused instruction; nothing here assumes the absence of NaN.
+_FASTMATH = {"contract"}
+
+
+def kernel(signature: Any) -> Callable[[F], F]:
+    """Compile a kernel for one explicit signature, cached on disk."""
+
+    def decorate(function: F) -> F:
+        compiled: F = numba.njit(signature, cache=True, error_model="numpy", fastmath=_FASTMATH)(
+            function
+        )
+        return compiled
+
+    return decorate
+
+
+def inline(function: F) -> F:
+    """Compile a helper that kernels call; its types follow from the call."""
+    compiled: F = numba.njit(cache=True, error_model="numpy", fastmath=_FASTMATH)(function)
+    return compiled
+
+
+def monotonic_ns() -> int:
+    """Monotonic clock in nanoseconds, usable inside kernels (and in plain Python)."""
+    return time.perf_counter_ns()
+
+
+@intrinsic
+def _clock_gettime_ns(typingctx: Any) -> Any:
+    """`clock_gettime(CLOCK_MONOTONIC)` by symbol name, which keeps the cache of kernels valid."""
+    import sys
+
+    clock_id = 6 if sys.platform == "darwin" else 1
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        i64, i32 = ir.IntType(64), ir.IntType(32)
+        timespec = cgutils.alloca_once(builder, ir.ArrayType(i64, 2))
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(i32, [i32, timespec.type]), "clock_gettime"
+        )
+        builder.call(function, [i32(clock_id), timespec])
+        seconds = builder.load(cgutils.gep_inbounds(builder, timespec, 0, 0))
+        nanoseconds = builder.load(cgutils.gep_inbounds(builder, timespec, 0, 1))
+        return builder.add(builder.mul(seconds, i64(1_000_000_000)), nanoseconds)
+
+    return types.int64(), codegen
+
+
+@overload(monotonic_ns)
+def _monotonic_ns_overload() -> Any:
+    def implementation() -> Any:
+        return _clock_gettime_ns()
+
+    return implementation

@@ -1,0 +1,164 @@
+"""Numbers that judge a flight, each computed from its recording alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.geometry import pairwise_angles
+from colift.recording import Recording
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number: its name (which ends in its unit), meaning and formula."""
+
+    name: str
+    unit: str
+    meaning: str
+    compute: Callable[[Recording], float]
+
+
+_METRICS: list[Metric] = []
+
+
+def _metric(unit: str, meaning: str) -> Callable[[Callable[[Recording], float]], None]:
+    def register(function: Callable[[Recording], float]) -> None:
+        _METRICS.append(Metric(function.__name__, unit, meaning, function))
+
+    return register
+
+
+def all_metrics() -> tuple[Metric, ...]:
+    """Every metric, in the order of the report."""
+    return tuple(_METRICS)
+
+
+def compute(recording: Recording) -> dict[str, float]:
+    """All metrics of a recording by name; NaN where one does not apply."""
+    return {metric.name: float(metric.compute(recording)) for metric in _METRICS}
+
+
+def tracking_error(recording: Recording) -> NDArray[np.float64]:
+    """Load position less reference (rows, 3), m."""
+    return np.asarray(recording["load"][:, 0] - recording["reference"][:, 0])
+
+
+def integral(values: NDArray[np.float64], time: NDArray[np.float64]) -> float:
+    """Trapezoidal integral."""
+    return float(np.trapezoid(values, time)) if len(time) > 1 else 0.0
+
+
+def _total(recording: Recording) -> NDArray[np.float64]:
+    return np.asarray(np.abs(recording["tensions"]).sum(axis=1))
+
+
+def _smallest_angle(directions: NDArray[np.float64]) -> float:
+    if directions.shape[1] < 2:
+        return float("nan")
+    # In slices: pairs grow as n^2, and memory should not.
+    rows = max(1, 2_000_000 // directions.shape[1] ** 2)
+    parts = range(0, len(directions), rows)
+    return float(np.degrees(min(pairwise_angles(directions[k : k + rows]).min() for k in parts)))
+
+
+@_metric("m", "root mean square of the load's distance from its reference")
+def tracking_rms_m(r: Recording) -> float:
+    return float(np.sqrt(np.mean(np.sum(tracking_error(r) ** 2, axis=1))))
+
+
+@_metric("m", "largest distance of the load from its reference")
+def tracking_max_m(r: Recording) -> float:
+    return float(np.linalg.norm(tracking_error(r), axis=1).max())
+
+
+@_metric("deg", "smallest angle between two actual cables at any time")
+def min_angle_deg(r: Recording) -> float:
+    return _smallest_angle(r["directions"])
+
+
+@_metric("deg", "smallest angle between two wanted cables at any time")
+def min_desired_angle_deg(r: Recording) -> float:
+    return _smallest_angle(r["desired_directions"])
+
+
+@_metric("N", "largest simultaneous sum of tensions")
+def peak_total_tension_N(r: Recording) -> float:
+    return float(_total(r).max())
+
+
+@_metric("N", "time average of the sum of tensions")
+def mean_total_tension_N(r: Recording) -> float:
+    return float(_total(r).mean())
+
+
+@_metric("N", "largest tension of any cable")
+def peak_tension_N(r: Recording) -> float:
+    return float(r["tensions"].max())
+
+
+@_metric("N s", "sum of tensions integrated over the first 10 s (the paper's J_T)")
+def tension_integral_10s_Ns(r: Recording) -> float:
+    if r.time[-1] < 10.0 - 1e-9:
+        return float("nan")
+    rows = r.time <= 10.0 + 1e-9
+    return integral(_total(r)[rows], r.time[rows])
+
+
+@_metric("N s", "sum of tensions integrated over the flight")
+def tension_integral_Ns(r: Recording) -> float:
+    return integral(_total(r), r.time)
+
+
+@_metric("N", "root mean square of actual less wanted tension, over all cables")
+def tension_tracking_rms_N(r: Recording) -> float:
+    return float(np.sqrt(np.mean((r["tensions"] - r["desired_tensions"]) ** 2)))
+
+
+@_metric("1", "largest over smallest mean tension of the cables")
+def tension_imbalance(r: Recording) -> float:
+    means = r["tensions"].mean(axis=0)
+    return float(means.max() / means.min()) if means.min() > 0 else float("inf")
+
+
+@_metric("s", "time without tension, summed over cables")
+def slack_time_s(r: Recording) -> float:
+    return float(r["slack_times"][-1].sum())
+
+
+@_metric("1", "allocations that ended with a status other than ok")
+def allocator_failures(r: Recording) -> float:
+    return float(np.count_nonzero(r["allocator_status"]))
+
+
+@_metric("1", "mean iterations of an allocation")
+def allocator_mean_iterations(r: Recording) -> float:
+    return float(r["allocator_iterations"].mean())
+
+
+@_metric("1", "most iterations of an allocation")
+def allocator_max_iterations(r: Recording) -> float:
+    return float(r["allocator_iterations"].max())
+
+
+@_metric("us", "mean duration of an allocation")
+def allocator_mean_us(r: Recording) -> float:
+    return float(r["allocator_time"].mean() * 1e6)
+
+
+@_metric("us", "median duration of an allocation")
+def allocator_median_us(r: Recording) -> float:
+    return float(np.median(r["allocator_time"]) * 1e6)
+
+
+@_metric("us", "99th percentile of the duration of an allocation")
+def allocator_p99_us(r: Recording) -> float:
+    return float(np.percentile(r["allocator_time"], 99) * 1e6)
+
+
+@_metric("us", "longest allocation")
+def allocator_max_us(r: Recording) -> float:
+    return float(r["allocator_time"].max() * 1e6)

@@ -1,0 +1,1 @@
+"""Shipped missions, one TOML file each."""

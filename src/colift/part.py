@@ -1,0 +1,126 @@
+"""What all replaceable parts have in common, and how they are found by name.
+
+A *part* is one implementation of one layer: a file in the layer's folder holding one class. The
+class is its settings (a pydantic model: validated, named, documented) and knows how to turn them
+into what a kernel wants: a parameter vector and a memory vector.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import importlib.util
+import pkgutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from colift.errors import ColiftError, UnknownNameError
+from colift.team import Team
+
+Vector = NDArray[np.float64]
+
+LAYERS = (
+    "reference",
+    "load_control",
+    "allocation",
+    "position_control",
+    "attitude_control",
+    "plant",
+)
+"""The layers of the block diagram: folder name, mission section and entry-point group suffix."""
+
+
+class Part(BaseModel):
+    """Settings of one implementation of one layer.
+
+    A subclass declares its fields, names its ``kernel`` and packs the fields for it. Kernels may be
+    compiled (:func:`colift.jit.kernel`, with the layer's signature) or plain Python functions.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", validate_assignment=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+    layer: ClassVar[str]
+    kernel: ClassVar[Callable[..., Any]]
+
+    def params(self, team: Team) -> Vector:
+        """Parameter vector of the kernel; constant between two calls of the kernel."""
+        return np.zeros(0)
+
+    def memory(self, team: Team) -> Vector:
+        """Memory vector of the kernel in its initial state (integrators, warm starts, scratch)."""
+        return np.zeros(0)
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        """Problems that depend on the team, as ``(field, message)``; empty when all is well."""
+        return []
+
+
+_registered: dict[tuple[str, str], type[Part]] = {}
+
+
+def register(kind: str, part: type[Part]) -> type[Part]:
+    """Make ``part`` available to missions as ``kind = "<kind>"`` of its layer, in this process."""
+    if part.layer not in LAYERS:
+        raise UnknownNameError("layer", part.layer, LAYERS)
+    _registered[part.layer, kind] = part
+    return part
+
+
+def load_file(path: str | Path) -> list[type[Part]]:
+    """Import a user's Python file and register every part in it under the file's name."""
+    path = Path(path)
+    spec = importlib.util.spec_from_file_location(f"colift_user_{path.stem}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise ColiftError(f"{path}: not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    parts = _parts_of(module, module.__name__)
+    if not parts:
+        raise ColiftError(f"{path}: holds no class that derives from a layer's base class")
+    return [register(path.stem.replace("_", "-"), part) for part in parts]
+
+
+def names(layer: str) -> list[str]:
+    """Names of all parts of a layer, without importing (and so compiling) them."""
+    if layer not in LAYERS:
+        raise UnknownNameError("layer", layer, LAYERS)
+    folder = importlib.import_module(f"colift.{layer}")
+    own = {
+        module.name.replace("_", "-")
+        for module in pkgutil.iter_modules(folder.__path__)
+        if not module.name.startswith("_") and module.name != "base"
+    }
+    plugged = {point.name for point in importlib.metadata.entry_points(group=f"colift.{layer}")}
+    registered = {kind for (of, kind) in _registered if of == layer}
+    return sorted(own | plugged | registered)
+
+
+def find(layer: str, kind: str) -> type[Part]:
+    """The class behind ``kind`` in ``layer``: registered, another package's, or our own file."""
+    if (layer, kind) in _registered:
+        return _registered[layer, kind]
+    valid = names(layer)
+    if kind not in valid:
+        raise UnknownNameError(f"{layer} part", kind, valid)
+    for point in importlib.metadata.entry_points(group=f"colift.{layer}", name=kind):
+        part = point.load()
+        if not (isinstance(part, type) and issubclass(part, Part)):
+            raise ColiftError(f"entry point {point.value!r} is not a colift part")
+        return part
+    module = importlib.import_module(f"colift.{layer}.{kind.replace('-', '_')}")
+    return _parts_of(module, module.__name__)[0]
+
+
+def _parts_of(module: Any, name: str) -> list[type[Part]]:
+    return [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, Part) and value.__module__ == name
+    ]

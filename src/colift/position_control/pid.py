@@ -1,0 +1,135 @@
+"""The paper's position controller: PID to ``x_Ld - L_i alpha_id``, then thrust and attitude."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.jit import kernel
+from colift.math import quaternion
+from colift.part import Vector
+from colift.position_control.base import SIGNATURE, PositionControlPart
+from colift.team import Team
+
+Gain = Annotated[float, Field(ge=0.0)]
+
+_HEAD = 14  # params: g, k_p, k_d, k_i (3 each), limit, two time constants, rates on; then m, L
+_SLOTS = 15  # memory per drone: integral, alpha, alpha rate, u_hat, u_hat rate (3 each)
+
+
+@kernel(SIGNATURE)
+def _pid(  # type: ignore[no-untyped-def]
+    x, v, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
+):
+    n = x.shape[0]
+    g = params[0]
+    limit = params[10]
+    fresh = memory[0] == 0.0
+    memory[0] = 1.0
+    keep_alpha = math.exp(-dt / params[11]) if params[11] > 0.0 else 0.0
+    keep_u = math.exp(-dt / params[12]) if params[12] > 0.0 else 0.0
+    rates_on = params[13]
+    for i in range(n):
+        m_i = params[_HEAD + i]
+        L_i = params[_HEAD + n + i]
+        o = 1 + _SLOTS * i
+        norm = 0.0
+        for k in range(3):
+            # Rate of the wanted direction: first-order filter on the difference quotient.
+            if fresh:
+                memory[o + 3 + k] = alpha[i, k]
+            rate = rates_on * (alpha[i, k] - memory[o + 3 + k]) / dt
+            memory[o + 6 + k] = keep_alpha * memory[o + 6 + k] + (1.0 - keep_alpha) * rate
+            memory[o + 3 + k] = alpha[i, k]
+            x_e = x[i, k] - (reference[0, k] - L_i * alpha[i, k])
+            v_e = v[i, k] - (reference[1, k] - L_i * memory[o + 6 + k])
+            memory[o + k] = min(max(memory[o + k] + dt * x_e, -limit), limit)
+            gravity = g if k == 2 else 0.0
+            # u_i = m_i (g e3 + xdd_Ld) - T_id alpha_id - k_p x_e - k_d xdot_e - k_i int x_e
+            u[i, k] = (
+                m_i * (gravity + reference[2, k])
+                - T[i] * alpha[i, k]
+                - params[1 + k] * x_e
+                - params[4 + k] * v_e
+                - params[7 + k] * memory[o + k]
+            )
+            norm += u[i, k] * u[i, k]
+        norm = math.sqrt(norm)
+        thrusts[i] = norm
+        if norm > 1e-9:
+            hx, hy, hz = u[i, 0] / norm, u[i, 1] / norm, u[i, 2] / norm
+        else:
+            hx, hy, hz = 0.0, 0.0, 1.0
+        if fresh:
+            memory[o + 9] = hx
+            memory[o + 10] = hy
+            memory[o + 11] = hz
+        dx = (1.0 - keep_u) * (hx - memory[o + 9]) / dt + keep_u * memory[o + 12]
+        dy = (1.0 - keep_u) * (hy - memory[o + 10]) / dt + keep_u * memory[o + 13]
+        dz = (1.0 - keep_u) * (hz - memory[o + 11]) / dt + keep_u * memory[o + 14]
+        memory[o + 9] = hx
+        memory[o + 10] = hy
+        memory[o + 11] = hz
+        memory[o + 12] = dx
+        memory[o + 13] = dy
+        memory[o + 14] = dz
+        qw, qx, qy, qz = quaternion.from_thrust_direction(hx, hy, hz)
+        attitudes[i, 0] = qw
+        attitudes[i, 1] = qx
+        attitudes[i, 2] = qy
+        attitudes[i, 3] = qz
+        # Omega_id = 2 Im(q* qdot), with qdot from the rate of the thrust direction.
+        root = 2.0 * qw
+        if root < 1e-3:
+            rates[i, 0] = 0.0
+            rates[i, 1] = 0.0
+            rates[i, 2] = 0.0
+        else:
+            stretch = dz / root
+            w_dot = 0.5 * stretch
+            x_dot = -dy / root + hy * stretch / (root * root)
+            y_dot = dx / root - hx * stretch / (root * root)
+            _, ox, oy, oz = quaternion.multiply(qw, -qx, -qy, 0.0, w_dot, x_dot, y_dot, 0.0)
+            rates[i, 0] = 2.0 * ox
+            rates[i, 1] = 2.0 * oy
+            rates[i, 2] = 2.0 * oz
+
+
+class Pid(PositionControlPart):
+    """Drone position PID with the paper's gains (paper eqs. 8 to 10)."""
+
+    kernel = _pid
+
+    k_p: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
+    """Proportional gain per world axis, N/m (paper: 40)."""
+    k_d: tuple[Gain, Gain, Gain] = (10.0, 10.0, 10.0)
+    """Derivative gain, N s/m (paper: 10)."""
+    k_i: tuple[Gain, Gain, Gain] = (2.0, 2.0, 2.0)
+    """Integral gain, N/(m s) (paper: 2)."""
+    integral_limit: Annotated[float, Field(gt=0.0)] = 1.0
+    """Bound on the integral of the error per axis, m s."""
+    direction_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
+    """Time constant of the derivative of the wanted cable directions, s (unpublished; chosen)."""
+    thrust_filter: Annotated[float, Field(ge=0.0, le=0.1)] = 0.003
+    """Time constant of the derivative of the thrust direction, s (unpublished; chosen)."""
+    direction_rates: bool = True
+    """Include the wanted cable directions' rates in the drones' wanted velocities."""
+
+    def params(self, team: Team) -> Vector:
+        head = [
+            team.gravity,
+            *self.k_p,
+            *self.k_d,
+            *self.k_i,
+            self.integral_limit,
+            self.direction_filter,
+            self.thrust_filter,
+            float(self.direction_rates),
+        ]
+        return np.concatenate([head, team.masses, team.cable_lengths])
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(1 + _SLOTS * team.n)

@@ -1,0 +1,1 @@
+"""The closed loop: `signals` (what flows), `loop` (the block diagram), `flight` (running it)."""

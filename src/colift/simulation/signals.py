@@ -1,0 +1,119 @@
+"""Everything that flows between the layers, in one table.
+
+The loop keeps one row of numbers, the *bus*; every signal is a named view of a part of it. Writing
+the row to the log records all of them at once, and this table is the legend of a recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from colift.jit import matrix, vector
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One signal: name, shape (``"n"`` stands for the number of drones), unit, symbol, meaning."""
+
+    name: str
+    shape: tuple[int | str, ...]
+    unit: str
+    symbol: str
+    frame: str
+    meaning: str
+
+    def shape_for(self, n: int) -> tuple[int, ...]:
+        """Shape with the number of drones filled in."""
+        sizes = {"n": n, "n+1": n + 1}
+        return tuple(sizes[size] if isinstance(size, str) else size for size in self.shape)
+
+
+SIGNALS = (
+    Signal("reference", (4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives"),
+    Signal("load", (2, 3), "m, m/s", "x_L", "world", "load position and velocity"),
+    Signal("force", (3,), "N", "u_L", "world", "wanted total force of the cables on the load"),
+    Signal("desired_tensions", ("n",), "N", "T_id", "-", "tensions wanted by the allocator"),
+    Signal("desired_directions", ("n", 3), "1", "alpha_id", "world", "unit directions drone to load wanted by the allocator"),
+    Signal("tensions", ("n",), "N", "T_i", "-", "actual tensions"),
+    Signal("directions", ("n", 3), "1", "alpha_i", "world", "actual unit directions from drone to load"),
+    Signal("direction_rates", ("n", 3), "1/s", "alpha_dot_i", "world", "time derivatives of the directions"),
+    Signal("positions", ("n", 3), "m", "x_i", "world", "drone positions"),
+    Signal("velocities", ("n", 3), "m/s", "x_dot_i", "world", "drone velocities"),
+    Signal("attitudes", ("n", 4), "1", "q_i", "body to world", "drone attitudes, quaternion wxyz"),
+    Signal("rates", ("n", 3), "rad/s", "Omega_i", "body", "drone body rates"),
+    Signal("drone_forces", ("n", 3), "N", "u_i", "world", "wanted thrust vectors"),
+    Signal("thrusts", ("n",), "N", "f_i", "-", "thrust commands"),
+    Signal("desired_attitudes", ("n", 4), "1", "q_id", "body to world", "wanted attitudes, wxyz"),
+    Signal("desired_rates", ("n", 3), "rad/s", "Omega_id", "body", "wanted body rates"),
+    Signal("torques", ("n", 3), "N m", "tau_i", "body", "torque commands"),
+    Signal("external_forces", ("n+1", 3), "N", "d", "world", "disturbing forces on the drones and, last row, the load"),
+    Signal("slack_times", ("n",), "s", "-", "-", "time that each cable has spent without tension"),
+)  # fmt: skip
+"""Every recorded signal; one row of the log each recording period."""
+
+CYCLE_SIGNALS = (
+    Signal("allocator_status", (), "1", "-", "-", "status code of each allocation"),
+    Signal("allocator_iterations", (), "1", "-", "-", "iterations of each allocation"),
+    Signal("allocator_kkt_residual", (), "1", "-", "-", "optimality residual of each allocation"),
+    Signal("allocator_objective", (), "N^2", "J", "-", "objective of each allocation"),
+    Signal("allocator_optimality_gap", (), "N^2", "-", "-", "objective less the global optimum"),
+    Signal("allocator_force_residual", (), "N", "-", "-", "error of the force balance"),
+    Signal("allocator_time", (), "s", "-", "-", "measured duration of each allocation"),
+)
+"""Recorded once per allocation, in this order."""
+
+
+class Bus(NamedTuple):
+    """Views of the bus row, one per signal, and the row itself."""
+
+    row: Array
+    reference: Array
+    load: Array
+    force: Array
+    desired_tensions: Array
+    desired_directions: Array
+    tensions: Array
+    directions: Array
+    direction_rates: Array
+    positions: Array
+    velocities: Array
+    attitudes: Array
+    rates: Array
+    drone_forces: Array
+    thrusts: Array
+    desired_attitudes: Array
+    desired_rates: Array
+    torques: Array
+    external_forces: Array
+    slack_times: Array
+
+
+BUS_TYPE = types.NamedTuple(
+    [vector] + [vector if len(signal.shape) == 1 else matrix for signal in SIGNALS], Bus
+)
+"""Numba type of :class:`Bus`."""
+
+
+def columns(n: int) -> dict[str, slice]:
+    """Where each signal stands in the bus row."""
+    where, start = {}, 0
+    for signal in SIGNALS:
+        size = int(np.prod(signal.shape_for(n)))
+        where[signal.name] = slice(start, start + size)
+        start += size
+    return where
+
+
+def make_bus(n: int) -> Bus:
+    """A bus of zeros for n drones."""
+    where = columns(n)
+    row = np.zeros(max(part.stop for part in where.values()))
+    views = {s.name: row[where[s.name]].reshape(s.shape_for(n)) for s in SIGNALS}
+    return Bus(row=row, **views)
