@@ -17,7 +17,7 @@ class UnknownNameError(ColiftError):
         import difflib
 
         near = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = f"; did you mean {near[0]!r}?" if near else "."
         super().__init__(f"no {what} named {name!r}{hint} Available: {', '.join(valid)}.")
         self.name = name
         self.valid = tuple(valid)

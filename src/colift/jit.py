@@ -8,9 +8,15 @@ first-class functions and still be cached between processes.
 
 from __future__ import annotations
 
+import hashlib
+import os
+import tempfile
 import time
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite import ir
@@ -18,9 +24,10 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
+config: Any = numba.config
 F = TypeVar("F", bound=Callable[..., Any])
 
-JIT_ENABLED: bool = not bool(numba.config.DISABLE_JIT)
+JIT_ENABLED: bool = not bool(config.DISABLE_JIT)
 
 f8 = types.float64
 i8 = types.int64
@@ -37,18 +44,57 @@ def kernel(signature: Any) -> Callable[[F], F]:
     """Compile a kernel for one explicit signature, cached on disk."""
 
     def decorate(function: F) -> F:
-        compiled: F = numba.njit(signature, cache=True, error_model="numpy", fastmath=_FASTMATH)(
-            function
-        )
+        with _cache_for(function):
+            compiled: F = numba.njit(
+                signature, cache=True, error_model="numpy", fastmath=_FASTMATH
+            )(function)
         return compiled
 
     return decorate
 
 
 def inline(function: F) -> F:
-    """Compile a helper that kernels call; its types follow from the call."""
-    compiled: F = numba.njit(cache=True, error_model="numpy", fastmath=_FASTMATH)(function)
-    return compiled
+    """A helper that becomes part of the kernels that call it; its types follow from the call."""
+    compiled: Any = numba.njit(error_model="numpy", fastmath=_FASTMATH, forceinline=True)(function)
+    return cast(F, compiled)
+
+
+@contextmanager
+def _cache_for(function: Callable[..., Any]) -> Iterator[None]:
+    """Let Numba cache under a digest of the sources that a kernel of this folder can be made of.
+
+    Numba looks at the kernel's own file only: after a change of a helper elsewhere it would go on
+    with the old machine code.
+    """
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename).parent))
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+@cache
+def cache_folder(folder: Path) -> Path:
+    """Where the kernels of a source folder are cached; ``COLIFT_CACHE`` moves it."""
+    package = Path(__file__).parent
+    sources = [Path(__file__), *(package / "math").glob("*.py")]
+    if folder.is_relative_to(package):
+        sources += folder.glob("*.py")
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(sources):
+        digest.update(source.read_bytes())
+    home = os.environ.get("COLIFT_CACHE") or config.CACHE_DIR
+    if not home:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        home = Path(base) / "colift"
+    target = Path(home) / f"{folder.name}-{digest.hexdigest()[:16]}"
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError:  # no writable home: cache for this boot at least
+        target = Path(tempfile.gettempdir()) / "colift" / target.name
+        target.mkdir(parents=True, exist_ok=True)
+    return target
 
 
 def monotonic_ns() -> int:
@@ -83,3 +129,10 @@ def _monotonic_ns_overload() -> Any:
         return _clock_gettime_ns()
 
     return implementation
+
+
+def compiled_before() -> bool:
+    """Whether the simulation loop is in the compilation cache (or needs no compilation)."""
+    if not JIT_ENABLED:
+        return True
+    return any(cache_folder(Path(__file__).parent / "simulation").rglob("loop.advance-*.nbi"))

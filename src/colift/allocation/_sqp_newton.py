@@ -45,8 +45,8 @@ from colift.jit import inline
 ROW = 28
 """Workspace per cable: B (6), v (2), C^-1 q (2), C^-1 U^T (16), taut flag, spare."""
 
-SYSTEM = 8 * 8 + 8
-"""Workspace of the reduced system: matrix and right-hand side."""
+SYSTEM = 8 * 8 + 8 + 16
+"""Workspace of the reduced system: matrix, right-hand side, one cable's ``U_i``."""
 
 
 def workspace_size(n: int) -> int:
@@ -56,6 +56,9 @@ def workspace_size(n: int) -> int:
 
 DAMPING = 0.1
 """Levenberg-Marquardt factor: delta = DAMPING * residual."""
+
+LEAST_DAMPING = 1e-4
+"""Floor of delta: dividing by less amplifies rounding, and the residual stalls near 1e-11."""
 
 MAX_TURN = 0.7
 """Largest turn of one cable in one iteration, rad."""
@@ -120,8 +123,10 @@ def project(n, fx, fy, fz, T, alpha):  # type: ignore[no-untyped-def]
         y = alpha[3 * i + 1] - ry
         z = alpha[3 * i + 2] - rz
         norm = math.sqrt(x * x + y * y + z * z)
-        inverse = 1.0 / norm
         T[i] *= norm
+        if norm == 0.0:
+            continue  # nothing left of this cable's force: slack, direction kept
+        inverse = 1.0 / norm
         alpha[3 * i] = x * inverse
         alpha[3 * i + 1] = y * inverse
         alpha[3 * i + 2] = z * inverse
@@ -138,12 +143,15 @@ def rotate(n, ax, ay, az, bx, by, bz, alpha, lam):  # type: ignore[no-untyped-de
     vy = az * bx - ax * bz
     vz = ax * by - ay * bx
     c = ax * bx + ay * by + az * bz
-    if c < -1.0 + 1e-12:
-        # Half-turn about the unit axis u perpendicular to a: x -> 2 u (u.x) - x.
-        if abs(ax) < 0.9:
-            ux, uy, uz = 0.0, az, -ay
-        else:
-            ux, uy, uz = -az, 0.0, ax
+    if c < -0.9:
+        # ``1 / (1 + c)`` loses its digits here. The same rotation in two parts: half a turn about
+        # the unit axis u along a x b, x -> 2 u (u.x) - x, then the small rotation from -a to b.
+        ux, uy, uz = vx, vy, vz
+        if ux * ux + uy * uy + uz * uz < 1e-24:
+            if abs(ax) < 0.9:
+                ux, uy, uz = 0.0, az, -ay
+            else:
+                ux, uy, uz = -az, 0.0, ax
         norm = math.sqrt(ux * ux + uy * uy + uz * uz)
         ux /= norm
         uy /= norm
@@ -157,7 +165,15 @@ def rotate(n, ax, ay, az, bx, by, bz, alpha, lam):  # type: ignore[no-untyped-de
         lam[0] = d * ux - lam[0]
         lam[1] = d * uy - lam[1]
         lam[2] = d * uz - lam[2]
-        return
+        # Where a went (-a, but for the rounding of u), then on from there.
+        d = 2.0 * (ux * ax + uy * ay + uz * az)
+        ax = d * ux - ax
+        ay = d * uy - ay
+        az = d * uz - az
+        vx = ay * bz - az * by
+        vy = az * bx - ax * bz
+        vz = ax * by - ay * bx
+        c = ax * bx + ay * by + az * bz
     h = 1.0 / (1.0 + c)
     r00 = c + h * vx * vx
     r01 = h * vx * vy - vz
@@ -209,12 +225,20 @@ def measure(n, mu, T, alpha, M):  # type: ignore[no-untyped-def]
 
 
 @inline
+def turning_scale(n, mu):  # type: ignore[no-untyped-def]
+    """Size of the gradient across a cable, and of its curvature: ``T_i^2`` and ``mu |M|``."""
+    return 1.0 / (n * n) + mu * n
+
+
+@inline
 def kkt_residual(n, mu, T, alpha, M, lam):  # type: ignore[no-untyped-def]
     """Largest violation of stationarity and of the sign of an active bound's multiplier.
 
-    Relative to ``1 + mu``, the scale of the gradient. Force balance, unit norms and bounds hold by
-    construction of the iterates.
+    Relative to the size of the terms that must cancel: a mean tension ``1 / n`` along each cable,
+    :func:`turning_scale` across it. Force balance, unit norms and bounds hold by construction.
     """
+    along = float(n * n)
+    across = 1.0 / turning_scale(n, mu) ** 2
     l0, l1, l2 = lam[0], lam[1], lam[2]
     worst = 0.0
     for i in range(n):
@@ -230,16 +254,17 @@ def kkt_residual(n, mu, T, alpha, M, lam):  # type: ignore[no-untyped-def]
         px -= radial * x
         py -= radial * y
         pz -= radial * z
-        violation = px * px + py * py + pz * pz
+        violation = across * (px * px + py * py + pz * pz)
         if t > 0.0 or slope_T < 0.0:
-            violation += slope_T * slope_T
-        worst = max(worst, violation)
-    return math.sqrt(worst) / (1.0 + mu)
+            violation += along * slope_T * slope_T
+        if not violation <= worst:  # unlike max(), lets NaN through
+            worst = violation
+    return math.sqrt(worst)
 
 
 @inline
 def assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S):  # type: ignore[no-untyped-def]
-    """Build the 8x8 system (lower triangle in ``S[:64]``, right-hand side in ``S[64:]``).
+    """Build the 8x8 system (matrix in ``S[:64]``, right-hand side in ``S[64:]``).
 
     Returns the smallest eigenvalue over all ``C_i``, before convexification.
     """
@@ -247,7 +272,7 @@ def assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S):  # type: igno
     root = math.sqrt(2.0 * mu)  # sqrt(mu) of G times sqrt(2) of its off-diagonal coordinates
     root_a = math.sqrt(0.5 * mu)
     root_b = math.sqrt(1.5 * mu)
-    for k in range(SYSTEM):
+    for k in range(72):
         S[k] = 0.0
     S[64] = fx
     S[65] = fy
@@ -273,8 +298,11 @@ def assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S):  # type: igno
         o = ROW * i
         if taut:
             S[0] += x * x
+            S[1] += x * y
+            S[2] += x * z
             S[8] += x * y
             S[9] += y * y
+            S[10] += y * z
             S[16] += x * z
             S[17] += y * z
             S[18] += z * z
@@ -321,54 +349,69 @@ def assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S):  # type: igno
         rows[o + 7] = v2
         rows[o + 8] = i11 * q1 + i12 * q2
         rows[o + 9] = i12 * q1 + i22 * q2
-        u = (
-            t * bx - x * v1,
-            t * by - y * v1,
-            t * bz - z * v1,
-            root * (x * by + y * bx),
-            root * (x * bz + z * bx),
-            root * (y * bz + z * by),
-            root_a * 2.0 * (x * bx - y * by),
-            root_b * 2.0 * z * bz,
-        )
-        w = (
-            t * dx - x * v2,
-            t * dy - y * v2,
-            t * dz - z * v2,
-            root * (x * dy + y * dx),
-            root * (x * dz + z * dx),
-            root * (y * dz + z * dy),
-            root_a * 2.0 * (x * dx - y * dy),
-            root_b * 2.0 * z * dz,
-        )
+        # U_i, in the workspace next to S: constant distances let the compiler use vectors.
+        S[72] = t * bx - x * v1
+        S[73] = t * by - y * v1
+        S[74] = t * bz - z * v1
+        S[75] = root * (x * by + y * bx)
+        S[76] = root * (x * bz + z * bx)
+        S[77] = root * (y * bz + z * by)
+        S[78] = root_a * 2.0 * (x * bx - y * by)
+        S[79] = root_b * 2.0 * z * bz
+        S[80] = t * dx - x * v2
+        S[81] = t * dy - y * v2
+        S[82] = t * dz - z * v2
+        S[83] = root * (x * dy + y * dx)
+        S[84] = root * (x * dz + z * dx)
+        S[85] = root * (y * dz + z * dy)
+        S[86] = root_a * 2.0 * (x * dx - y * dy)
+        S[87] = root_b * 2.0 * z * dz
         for k in range(8):
-            first = i11 * u[k] + i12 * w[k]
-            second = i12 * u[k] + i22 * w[k]
-            rows[o + 10 + 2 * k] = first
-            rows[o + 11 + 2 * k] = second
+            first = i11 * S[72 + k] + i12 * S[80 + k]
+            second = i12 * S[72 + k] + i22 * S[80 + k]
+            rows[o + 10 + k] = first
+            rows[o + 18 + k] = second
             S[64 + k] -= first * q1 + second * q2
-            for m in range(k + 1):
-                S[8 * k + m] += first * u[m] + second * w[m]
+            for m in range(8):
+                S[8 * k + m] += first * S[72 + m] + second * S[80 + m]
     return smallest
 
 
 @inline
-def solve_system(S):  # type: ignore[no-untyped-def]
-    """Solve the 8x8 system by LDL^T in place; the solution replaces the right-hand side.
+def _subtract_row(S, r, factor, p0, p1, p2, p3, p4, p5, p6, p7):  # type: ignore[no-untyped-def]
+    """``S[r] -= factor * p`` for one row of eight; straight-line, so that it becomes vector code."""
+    S[r] -= factor * p0
+    S[r + 1] -= factor * p1
+    S[r + 2] -= factor * p2
+    S[r + 3] -= factor * p3
+    S[r + 4] -= factor * p4
+    S[r + 5] -= factor * p5
+    S[r + 6] -= factor * p6
+    S[r + 7] -= factor * p7
 
-    The right-hand side is a ninth row, so that elimination is forward substitution as well.
+
+@inline
+def solve_system(S):  # type: ignore[no-untyped-def]
+    """Solve the symmetric 8x8 system in place; the solution replaces the right-hand side.
+
+    Elimination without pivoting: the matrix is positive definite. Rows are treated whole, though only
+    the columns right of the pivot matter.
     """
     for k in range(8):
+        o = 8 * k
         inverse = 1.0 / max(S[9 * k], 1e-300)
         S[9 * k] = inverse
-        for r in range(k + 1, 9):
-            factor = S[8 * r + k] * inverse
-            for m in range(k + 1, min(r + 1, 8)):
-                S[8 * r + m] -= factor * S[8 * m + k]
+        p0, p1, p2, p3 = S[o], S[o + 1], S[o + 2], S[o + 3]
+        p4, p5, p6, p7 = S[o + 4], S[o + 5], S[o + 6], S[o + 7]
+        for r in range(o + 8, 64, 8):
+            _subtract_row(S, r, S[r + k] * inverse, p0, p1, p2, p3, p4, p5, p6, p7)
+        forward = S[64 + k] * inverse
+        for m in range(k + 1, 8):
+            S[64 + m] -= forward * S[o + m]
     for k in range(7, -1, -1):
         value = S[64 + k]
         for m in range(k + 1, 8):
-            value -= S[8 * m + k] * S[64 + m]
+            value -= S[8 * k + m] * S[64 + m]
         S[64 + k] = value * S[9 * k]
 
 
@@ -385,8 +428,8 @@ def newton_step(n, T, alpha, mu, M, lam, rows, S):  # type: ignore[no-untyped-de
         xi1 = -rows[o + 8]
         xi2 = -rows[o + 9]
         for k in range(8):
-            xi1 -= rows[o + 10 + 2 * k] * S[64 + k]
-            xi2 -= rows[o + 11 + 2 * k] * S[64 + k]
+            xi1 -= rows[o + 10 + k] * S[64 + k]
+            xi2 -= rows[o + 18 + k] * S[64 + k]
         x = alpha[3 * i]
         y = alpha[3 * i + 1]
         z = alpha[3 * i + 2]
@@ -445,6 +488,7 @@ def solve(n, fx, fy, fz, mu, tolerance, max_iterations, T, alpha, lam, work, inf
         project(n, fx, fy, fz, T, alpha)
     J = measure(n, mu, T, alpha, M)
     best = optimal_objective(n, mu)
+    scale = turning_scale(n, mu)
     status = ITERATION_LIMIT
     kicked = False
     damping = 1.0
@@ -452,16 +496,16 @@ def solve(n, fx, fy, fz, mu, tolerance, max_iterations, T, alpha, lam, work, inf
     residual = math.inf
     while True:
         residual = kkt_residual(n, mu, T, alpha, M, lam)
-        if not math.isfinite(residual):
+        if not math.isfinite(residual + J):
             status = NOT_FINITE
             break
         if residual <= tolerance:
             status = CONVERGED
-            if kicked or J - best <= 1e-7 * (1.0 + mu) or iterations >= max_iterations:
+            if kicked or J - best <= 1e-7 * best or iterations >= max_iterations:
                 break
             # A stationary point above the optimum: leave it if it is a saddle.
             smallest = assemble(n, fx, fy, fz, mu, T, alpha, M, lam, 1.0, rows, S)
-            if smallest > -1e-6 * (1.0 + mu):
+            if smallest > -1e-6 * scale:
                 break
             kicked = True
             for i in range(n):
@@ -476,7 +520,7 @@ def solve(n, fx, fy, fz, mu, tolerance, max_iterations, T, alpha, lam, work, inf
         if iterations >= max_iterations:
             break
         iterations += 1
-        delta = min(max(DAMPING * residual, 1e-7), 1.0) * (1.0 + mu) * damping
+        delta = min(max(DAMPING * residual, LEAST_DAMPING), 1.0) * scale * damping
         assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S)
         solve_system(S)
         slope, largest = newton_step(n, T, alpha, mu, M, lam, rows, S)
@@ -487,12 +531,14 @@ def solve(n, fx, fy, fz, mu, tolerance, max_iterations, T, alpha, lam, work, inf
         for _ in range(12):
             total = trial_point(n, fx, fy, fz, s, T, alpha, rows, T_new, alpha_new)
             J_new = measure(n, mu, T_new, alpha_new, M_new)
-            if total > 0.5 and J_new <= J + 1e-4 * s * slope + 1e-13 * (1.0 + mu):
+            if total > 0.5 and J_new <= J + 1e-4 * s * slope + 1e-13 * J:
                 accepted = True
                 break
             s *= 0.5
         if not accepted:
             damping *= 100.0
+            for k in range(3):  # a wrong multiplier may be why: keep the better estimate
+                lam[k] = S[64 + k]
             continue
         damping = max(1.0, 0.1 * damping)
         for k in range(3):

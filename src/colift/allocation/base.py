@@ -6,6 +6,7 @@ An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i 
 from __future__ import annotations
 
 import enum
+import operator
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -53,6 +54,10 @@ class Status(enum.IntEnum):
     """The iteration left the numbers: the last directions with a share that balances the force."""
     CLAMPED = 5
     """A tension came out negative and was set to zero: the force is not fully balanced."""
+    FORCE_REDUCED = 6
+    """The limits do not allow the whole force: the nearest allowed one, horizontal part given up first."""
+    RECOVERING = 7
+    """The start broke a limit: the cables are on their way back, none worse than it was."""
 
     @property
     def ok(self) -> bool:
@@ -136,6 +141,7 @@ class Allocation:
 
 
 _STATUS = tuple(Status)
+_REST = np.zeros(3)
 
 
 class Allocator:
@@ -156,10 +162,11 @@ class Allocator:
     def __init__(
         self, part: AllocatorPart, team: Team | int, *, cone_deg: float = 35.0, dt: float = 0.01
     ) -> None:
-        if isinstance(team, int):
-            if team < 1:
-                raise ValueError(f"n must be at least 1, got {team}")
-            team = Team.uniform(team)
+        if not isinstance(team, Team):
+            n = operator.index(team)  # any kind of integer, NumPy's too
+            if n < 1:
+                raise ValueError(f"n must be at least 1, got {n}")
+            team = Team.uniform(n)
         self.part = part
         self.team = team
         self.dt = float(dt)
@@ -231,7 +238,8 @@ class Allocator:
         force : (3,) array
             Total force that the cables must exert on the load, world frame, N.
         acceleration : (3,) array, optional
-            Wanted acceleration of the load, m/s^2, for allocators that respect thrust limits.
+            Wanted acceleration of the load, m/s^2, for allocators that respect thrust limits;
+            zero when left out.
 
         Returns
         -------
@@ -243,9 +251,14 @@ class Allocator:
         ValueError
             Only when ``force`` or ``acceleration`` does not have three components.
         """
-        self._force[:] = force
-        if acceleration is not None:
-            self._acceleration[:] = acceleration
+        wanted = np.asarray(force, dtype=float)
+        if wanted.shape != (3,):
+            raise ValueError(f"force must have shape (3,), got {wanted.shape}")
+        motion = _REST if acceleration is None else np.asarray(acceleration, dtype=float)
+        if motion.shape != (3,):
+            raise ValueError(f"acceleration must have shape (3,), got {motion.shape}")
+        self._force[:] = wanted
+        self._acceleration[:] = motion
         start = perf_counter()
         status = self._kernel(
             self._force,

@@ -14,6 +14,7 @@ from colift.allocation.base import (
     INFO_BALANCE,
     INFO_GAP,
     INFO_OBJECTIVE,
+    INFO_RESIDUAL,
     SIGNATURE,
     Allocator,
     AllocatorPart,
@@ -49,6 +50,7 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     fx, fy, fz = force[0], force[1], force[2]
     W = math.sqrt(fx * fx + fy * fy + fz * fz)
     if not math.isfinite(W):
+        info[INFO_RESIDUAL] = math.nan
         info[INFO_GAP] = math.nan
         info[INFO_OBJECTIVE] = math.nan
         info[INFO_BALANCE] = math.nan
@@ -58,6 +60,8 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
             T[i] = 0.0
         memory[0] = 0.0
         info[INFO_BALANCE] = W
+        info[INFO_RESIDUAL] = math.nan
+        info[INFO_OBJECTIVE] = math.nan
         info[INFO_GAP] = math.nan
         return _ZERO_FORCE
     fx /= W

@@ -27,7 +27,7 @@ def _pid(load, reference, dt, params, memory, u_L):  # type: ignore[no-untyped-d
         memory[k] = min(max(memory[k] + dt * e, -params[11]), params[11])
         gravity = g if k == 2 else 0.0
         u_L[k] = (
-            sign * m_L * (gravity + reference[2, k])
+            sign * m_L * (gravity + params[13] * reference[2, k])
             - params[2 + k] * e
             - params[5 + k] * e_dot
             - params[8 + k] * memory[k]
@@ -51,14 +51,15 @@ class Pid(LoadControlPart):
     """Integral gain, N/(m s) (unpublished; chosen)."""
     integral_limit: Annotated[float, Field(gt=0.0)] = 1.0
     """Bound on the integral of the error per axis, m s."""
+    feed_forward: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    """Share of the wanted acceleration that is fed forward; 1 in the paper."""
     sign: Literal["corrected", "as-printed"] = "corrected"
     """Sign of the feed-forward term."""
 
     def params(self, team: Team) -> Vector:
         sign = 1.0 if self.sign == "corrected" else -1.0
-        return np.array(
-            [team.load_mass, team.gravity, *self.k_p, *self.k_d, *self.k_i, self.integral_limit, sign]
-        )
+        head = [team.load_mass, team.gravity, *self.k_p, *self.k_d, *self.k_i]
+        return np.array([*head, self.integral_limit, sign, self.feed_forward])
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(3)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, SerializeAsAny, Tag
 
 from colift.allocation.base import AllocatorPart
 from colift.attitude_control.base import AttitudeControlPart
@@ -20,9 +20,26 @@ from colift.team import Team
 
 Positive = Annotated[float, Field(gt=0.0)]
 Inertia = tuple[Positive, Positive, Positive]
-Point = tuple[float, float, float]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+Period = Annotated[float, Field(gt=0.0, le=1e6)]
 
 MAX_DRONES = 1024
+
+
+def _depth(value: Any) -> int:
+    return 1 + _depth(value[0]) if isinstance(value, list | tuple) and value else 0
+
+
+def _per_drone(depth: int) -> Discriminator:
+    """Tell one value for all drones, a list of this depth, from a list with one value per drone."""
+    return Discriminator(lambda value: "each" if _depth(value) > depth else "all")
+
+
+_ForEach = Annotated[list[Positive], Tag("each")]
+PerDrone = Annotated[Annotated[Positive, Tag("all")] | _ForEach, _per_drone(0)]
+InertiaForEach = Annotated[list[Inertia], Tag("each")]
+InertiaPerDrone = Annotated[Annotated[Inertia, Tag("all")] | InertiaForEach, _per_drone(1)]
 
 
 class Section(BaseModel):
@@ -31,6 +48,10 @@ class Section(BaseModel):
     model_config = ConfigDict(
         extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True, validate_default=True
     )
+
+    def problems(self) -> list[tuple[str, str, str]]:
+        """Mistakes in how the fields go together, as ``(field, value, message)``."""
+        return []
 
 
 class World(Section):
@@ -52,12 +73,27 @@ class Drones(Section):
 
     count: Annotated[int, Field(ge=1, le=MAX_DRONES)] = 4
     """Number of drones."""
-    mass: Positive | list[Positive] = 0.5
+    mass: PerDrone = 0.5
     """kg."""
-    inertia: Inertia | list[Inertia] = (0.021, 0.0187, 0.0397)
+    inertia: InertiaPerDrone = (0.021, 0.0187, 0.0397)
     """Principal moments of inertia, body frame, kg m^2."""
-    cable_length: Positive | list[Positive] = 1.0
+    cable_length: PerDrone = 1.0
     """m."""
+
+    def problems(self) -> list[tuple[str, str, str]]:
+        """Lists whose length is not the number of drones, and moments that no body has."""
+        found = []
+        for name in ("mass", "inertia", "cable_length"):
+            value = getattr(self, name)
+            if isinstance(value, list) and len(value) != self.count:
+                message = f"must be one value or a list of drones.count = {self.count}"
+                found.append((name, f"{len(value)} values", message))
+        for row in self.inertia if isinstance(self.inertia, list) else [self.inertia]:
+            if max(row) > sum(row) - max(row) + 1e-9 * sum(row):
+                message = "no body has these: each moment must be at most the sum of the other two"
+                found.append(("inertia", str(list(row)), message))
+                break
+        return found
 
 
 class Start(Section):
@@ -72,12 +108,13 @@ class Start(Section):
     load_offset: Point = (0.0, 0.0, 0.0)
     """Offset of the load from the reference's first point, m."""
 
-    @model_validator(mode="after")
-    def _no_zero_direction(self) -> Start:
-        for i, direction in enumerate(self.directions or []):
-            if math.hypot(*direction) < 1e-9:
-                raise ValueError(f"directions.{i} is zero; a direction needs a length")
-        return self
+    def problems(self) -> list[tuple[str, str, str]]:
+        """Directions without a length."""
+        return [
+            (f"directions.{i}", str(list(direction)), "is zero; a direction needs a length")
+            for i, direction in enumerate(self.directions or [])
+            if math.hypot(*direction) < 1e-9
+        ]
 
 
 class Timing(Section):
@@ -87,15 +124,15 @@ class Timing(Section):
     """Length of the flight, s."""
     step: Annotated[float, Field(ge=1e-5, le=0.01)] = 0.001
     """Physics step, s (paper: 0.001)."""
-    load_control: Positive = 0.001
+    load_control: Period = 0.001
     """Period of the load controller, s."""
-    allocation: Positive = 0.001
+    allocation: Period = 0.001
     """Period of the allocator, s."""
-    position_control: Positive = 0.001
+    position_control: Period = 0.001
     """Period of the drones' position controllers, s."""
-    attitude_control: Positive = 0.001
+    attitude_control: Period = 0.001
     """Period of the drones' attitude controllers, s."""
-    recording: Positive = 0.005
+    recording: Period = 0.005
     """Period of the recording, s; what happens once per allocation is recorded each time."""
 
     def multiples(self) -> dict[str, int]:
@@ -103,18 +140,18 @@ class Timing(Section):
         names = ("load_control", "allocation", "position_control", "attitude_control", "recording")
         return {name: round(getattr(self, name) / self.step) for name in names}
 
-    def problems(self) -> list[tuple[str, Any, str]]:
-        """Periods that are no whole multiple of the step, as (field, value, message)."""
+    def problems(self) -> list[tuple[str, str, str]]:
+        """Periods that are no whole multiple of the step, or longer than the flight."""
         found = []
         for name, count in self.multiples().items():
             period = getattr(self, name)
             if count < 1 or abs(count * self.step - period) > 1e-9 * period:
                 nearest = max(1, count) * self.step
-                found.append(
-                    (name, period, f"must be a whole multiple of timing.step = {self.step:g} s; nearest {nearest:g}")
-                )
+                message = f"must be a whole multiple of timing.step = {self.step:g} s; nearest {nearest:g}"
+                found.append((name, f"{period:g}", message))
             elif period > self.duration:
-                found.append((name, period, f"must not exceed timing.duration = {self.duration:g} s"))
+                message = f"must not exceed timing.duration = {self.duration:g} s"
+                found.append((name, f"{period:g}", message))
         return found
 
     @property
@@ -124,18 +161,18 @@ class Timing(Section):
 
 
 class Event(Section):
-    """A change of the truth during the flight, unknown to the controllers."""
+    """A change during the flight: of the truth, unknown to the controllers, or of the allocator."""
 
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
-    field: Literal["load.mass"]
-    """What changes."""
-    value: Annotated[float, Field(gt=0.0, le=1e5)]
+    field: Annotated[str, Field(pattern=r"^(load\.mass|allocation\.[a-z_]+)$")]
+    """What changes: ``load.mass`` (the plant's only) or a setting of the allocator."""
+    value: Any
     """New value, in the field's unit."""
 
 
-class Mission(Section):
-    """A complete flight. Each layer's section names a part with ``kind`` and gives its settings."""
+class Frame(Section):
+    """What is the same in every mission: all but the sections of the layers."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
     """Short name."""
@@ -149,15 +186,7 @@ class Mission(Section):
     start: Start = Start()
     timing: Timing = Timing()
     events: list[Event] = []
-    """Changes of the truth during the flight."""
-    kinds: dict[str, str]
-    """Name of the part in each layer."""
-    reference: SerializeAsAny[ReferencePart]
-    load_control: SerializeAsAny[LoadControlPart]
-    allocation: SerializeAsAny[AllocatorPart]
-    position_control: SerializeAsAny[PositionControlPart]
-    attitude_control: SerializeAsAny[AttitudeControlPart]
-    plant: SerializeAsAny[PlantPart]
+    """Changes during the flight."""
 
     @property
     def team(self) -> Team:
@@ -179,6 +208,19 @@ class Mission(Section):
             return ring(self.drones.count, cone, heading=heading)
         given = np.array(self.start.directions, dtype=float)
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
+
+
+class Mission(Frame):
+    """A complete flight. Each layer's section names a part with ``kind`` and gives its settings."""
+
+    kinds: dict[str, str]
+    """Name of the part in each layer."""
+    reference: SerializeAsAny[ReferencePart]
+    load_control: SerializeAsAny[LoadControlPart]
+    allocation: SerializeAsAny[AllocatorPart]
+    position_control: SerializeAsAny[PositionControlPart]
+    attitude_control: SerializeAsAny[AttitudeControlPart]
+    plant: SerializeAsAny[PlantPart]
 
     def resolved(self) -> dict[str, Any]:
         """The whole mission with every default filled in, as plain data (a valid mission file)."""

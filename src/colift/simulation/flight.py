@@ -90,8 +90,8 @@ class Flight:
             arrays[signal.name] = self._cycles[:cycles, k]
         return Recording(
             mission=self.mission,
-            time=np.arange(rows) * (every.recording * every.step),
-            cycle_time=np.arange(cycles) * (every.allocation * every.step),
+            time=np.arange(rows, dtype=np.float64) * (every.recording * every.step),
+            cycle_time=np.arange(cycles, dtype=np.float64) * (every.allocation * every.step),
             arrays=arrays,
             outcome=self.outcome,
         )
@@ -115,22 +115,28 @@ class Flight:
         self._step = stop
 
     def _stops(self) -> list[int]:
-        """Steps at which the loop pauses: each simulated second, each event, the end."""
+        """Steps to come at which the loop pauses: each simulated second, each event, the end."""
         step, steps = self._every.step, self.mission.timing.steps
         chunk = max(1, round(CHUNK / step))
         events = {self._event_step(event.at) for event in self.mission.events}
-        return sorted({*range(chunk, steps, chunk), *(e for e in events if 0 < e < steps), steps})
+        return sorted(s for s in {*range(chunk, steps, chunk), *events, steps} if self._step < s <= steps)
 
     def _event_step(self, at: float) -> int:
         return round(at / self._every.step)
 
     def _apply_events(self) -> None:
-        """Give the plant the parameters that hold at the present step."""
-        due = [e for e in self.mission.events if self._event_step(e.at) <= self._step]
+        """Give plant and allocator the parameters that hold at the present step."""
+        mission, due = self.mission, {}
+        for event in sorted(self.mission.events, key=lambda event: event.at):
+            if self._event_step(event.at) <= self._step:
+                due[event.field] = event.value
+        if "load.mass" in due:
+            truth = replace(mission.team, load_mass=due.pop("load.mass"))
+            self._params.plant[:] = mission.plant.params(truth)
         if due:
-            latest = max(due, key=lambda event: event.at)
-            truth = replace(self.mission.team, load_mass=latest.value)
-            self._params.plant[:] = self.mission.plant.params(truth)
+            changed = {field.partition(".")[2]: value for field, value in due.items()}
+            part = mission.allocation.model_copy(update=changed)
+            self._params.allocation[:] = part.params(mission.team)
 
 
 def start_state(mission: Mission) -> Start:

@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""Set colift up in a virtual environment of its own, then fly, test or run a command.
+
+    python3 bootstrap.py run  [ARGUMENT ...]     set up, then: colift run ARGUMENT ...
+    python3 bootstrap.py test [ARGUMENT ...]     set up with the test tools, then: pytest ARGUMENT ...
+    python3 bootstrap.py check                   set up with all tools: lint, types, docs, benchmark
+    python3 bootstrap.py COMMAND [ARGUMENT ...]  set up, then: colift COMMAND ARGUMENT ...
+
+Needs only Python 3.11 to 3.13. Everything goes into ./.venv, from lock files with hashes; the
+system's Python is left alone. A second call installs nothing unless a lock file has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+ENVIRONMENT = ROOT / ".venv"
+BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
+SUPPORTED = ((3, 11), (3, 13))
+CHECKS = (
+    ("ruff", "check", "."),
+    ("ruff", "format", "--check", "."),
+    ("mypy",),
+    ("lint-imports",),
+    ("sphinx-build", "-W", "--keep-going", "-q", "-b", "html", "docs", "docs/_build/html"),
+    ("colift", "bench", "--quick"),
+)
+
+
+def set_up(lock: str) -> None:
+    """Make the environment hold exactly what the lock file names, and this project (editable)."""
+    first, last = SUPPORTED
+    if not first <= sys.version_info[:2] <= last:
+        wanted = f"{first[0]}.{first[1]} to {last[0]}.{last[1]}"
+        sys.exit(f"colift needs Python {wanted}; this is {sys.version.split()[0]}")
+    requirements = ROOT / lock
+    project = (ROOT / "pyproject.toml").read_bytes()
+    key = hashlib.sha256(requirements.read_bytes() + project + str(ROOT).encode()).hexdigest()
+    stamp = ENVIRONMENT / f"{lock}.installed"
+    if stamp.is_file() and stamp.read_text() == key:
+        return
+    print(f"Setting up {ENVIRONMENT} from {lock} (once; a few minutes at most)", file=sys.stderr)
+    if not (BIN / "python").exists() and not (BIN / "python.exe").exists():
+        venv.create(ENVIRONMENT, with_pip=True)
+    pip = [str(BIN / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    execute([*pip, "--require-hashes", "--requirement", str(requirements)])
+    execute([*pip, "--no-deps", "--editable", str(ROOT)])
+    stamp.write_text(key)
+
+
+def execute(command: list[str]) -> None:
+    """Run a command; end with its exit code if it fails."""
+    code = subprocess.call(command, cwd=ROOT, stdout=sys.stderr if "pip" in command else None)
+    if code:
+        sys.exit(code)
+
+
+def main() -> None:
+    """Do what the first argument says."""
+    arguments = sys.argv[1:] or ["run"]
+    if arguments[0] in {"-h", "--help"}:
+        print(__doc__)
+        return
+    task, rest = arguments[0], arguments[1:]
+    set_up("requirements-dev.lock" if task in {"test", "check"} else "requirements.lock")
+    if task == "test":
+        execute([str(BIN / "python"), "-m", "pytest", *rest])
+    elif task == "check":
+        for name, *options in CHECKS:
+            print(f"== {name} {' '.join(options)}", flush=True)
+            execute([str(BIN / name), *options])
+    else:
+        execute([str(BIN / "colift"), task, *rest])
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,300 @@
+"""The `colift` command. Each command imports what it needs, so that help is instant."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from colift.errors import ColiftError, MissionError, UnknownNameError
+
+if TYPE_CHECKING:
+    from colift.simulation.flight import Progress as Report
+
+EXIT_ERROR = 1
+EXIT_USAGE = 2
+EXIT_DIVERGED = 3
+EXIT_INTERRUPTED = 130
+
+app = typer.Typer(
+    name="colift",
+    help="Several multirotors carry one load on cables: allocate, control, simulate, judge.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+out = Console()
+err = Console(stderr=True)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Change any field of the mission, e.g. allocation.mu=0.75."
+    ),
+]
+With = Annotated[
+    list[Path] | None,
+    typer.Option("--with", metavar="FILE", help="Python file with parts of your own to use."),
+]
+
+
+@app.command()
+def run(
+    mission: Annotated[
+        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
+    ] = "paper-spiral",
+    sets: Sets = None,
+    seed: Annotated[int | None, typer.Option(help="Seed instead of the mission's.")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="Result folder [default: runs/MISSION-DATE-TIME].")
+    ] = None,
+    extra: With = None,
+    report: Annotated[bool, typer.Option(help="Write the HTML report and its figures.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Fly a mission; print what happened; write recording, metrics and report.
+
+    [bold]Examples[/bold]
+
+      colift run
+      colift run figure-eight --set allocation.mu=0.75 --set timing.duration=60
+      colift run my-mission.toml --out results/first --json
+    """
+    from colift.mission.load import parse_override
+
+    with loading():
+        import colift
+        from colift import metrics
+        from colift.part import load_file
+
+        for path in extra or []:
+            load_file(path)
+        overrides = dict(parse_override(text) for text in sets or [])
+        loaded = colift.load_mission(mission, {**overrides, **({} if seed is None else {"seed": seed})})
+    with progress(f"Flying {loaded.name}") as advance:
+        flown = colift.run(loaded, progress=advance)
+    target = folder or Path("runs") / f"{_slug(loaded.name)}-{datetime.now():%Y%m%d-%H%M%S}"
+    files = write_results(flown, target, report=report)
+    if as_json:
+        emit(
+            {
+                "mission": loaded.name,
+                "outcome": flown.recording.outcome,
+                "metrics": flown.metrics,
+                "loop_time_s": flown.loop_time,
+                "compiled": flown.compiled,
+                "files": {name: str(path) for name, path in files.items()},
+            }
+        )
+    else:
+        table = Table(title=escape(f"{loaded.name}: {flown.recording.outcome}"), title_justify="left")
+        table.add_column("metric")
+        table.add_column("value", justify="right")
+        table.add_column("unit")
+        table.add_column("meaning", style="dim")
+        for metric in metrics.all_metrics():
+            value = f"{flown.metrics[metric.name]:.5g}"
+            table.add_row(metric.name, value, metric.unit, metric.meaning)
+        out.print(table)
+        simulated = loaded.timing.duration
+        how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
+        out.print(
+            f"{simulated:g} s of flight in {flown.loop_time:.3f} s ({how}, "
+            f"{simulated / flown.loop_time:.0f} times real time)."
+        )
+        for name, path in files.items():
+            out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+    if flown.recording.outcome != "completed":
+        raise typer.Exit(EXIT_DIVERGED)
+
+
+@app.command()
+def reproduce(
+    folder: Annotated[Path | None, typer.Option("--out", help="Result folder.")] = None,
+    report: Annotated[bool, typer.Option(help="Write the HTML page and its figures.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Fly everything in the paper and set our figures beside the printed ones.
+
+    Each row ends in a verdict: reproduced, better, or differs because of a named reason. The
+    paper's errata are each demonstrated by a flight or a computation.
+    """
+    with loading():
+        from colift import reproduction
+    with progress("Reproducing the paper") as advance:
+        result = reproduction.reproduce(advance)
+    target = folder or Path("runs") / f"reproduce-{datetime.now():%Y%m%d-%H%M%S}"
+    files = reproduction.write(result, target, report=report)
+    if as_json:
+        emit({**result.as_dict(), "files": {name: str(path) for name, path in files.items()}})
+        return
+    for section, rows in result.sections():
+        table = Table(title=section, title_justify="left", show_lines=True)
+        table.add_column("quantity", ratio=3)
+        table.add_column("paper", justify="right")
+        table.add_column("ours", justify="right")
+        table.add_column("verdict", ratio=4)
+        for row in rows:
+            table.add_row(escape(row.quantity), row.paper_text, row.ours_text, escape(row.verdict_text))
+        out.print(table)
+    for name, path in files.items():
+        out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+
+
+@app.command(name="list")
+def list_(
+    as_json: Json = False,
+) -> None:
+    """Name the shipped missions and the parts of every layer."""
+    from colift.mission.load import mission_names, read_source
+    from colift.part import LAYERS, names
+
+    missions = {name: read_source(name)[1].get("description", "") for name in mission_names()}
+    parts = {layer: names(layer) for layer in LAYERS}
+    if as_json:
+        emit({"missions": missions, "parts": parts})
+        return
+    table = Table(title="Missions (colift run NAME)", title_justify="left")
+    table.add_column("name", no_wrap=True)
+    table.add_column("what it shows")
+    for name, text in missions.items():
+        table.add_row(name, escape(text))
+    out.print(table)
+    table = Table(title="Parts (--set LAYER.kind=NAME)", title_justify="left")
+    table.add_column("layer", no_wrap=True)
+    table.add_column("names")
+    for layer, kinds in parts.items():
+        table.add_row(layer, ", ".join(kinds))
+    out.print(table)
+
+
+@app.command()
+def bench(
+    sizes: Annotated[
+        str, typer.Option(help="Numbers of drones, separated by commas.")
+    ] = "2,3,4,8,16,64,256,1024",
+    quick: Annotated[bool, typer.Option(help="Fewer repetitions; for a smoke test.")] = False,
+    file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Time the allocator and the closed loop on this machine; compare with SciPy's SLSQP.
+
+    Warm-up is excluded; median, 99th percentile and worst of many calls are shown, with the
+    iterations and the worst optimality residual, so that a fast wrong answer shows.
+    """
+    try:
+        counts = [int(text) for text in sizes.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{sizes!r} is not a list of whole numbers") from None
+    if any(not 1 <= n <= 1024 for n in counts):
+        raise typer.BadParameter("each number of drones must be between 1 and 1024")
+    with loading():
+        from colift import benchmark
+    with progress("Timing") as advance:
+        result = benchmark.run(counts, quick=quick, progress=advance)
+    if file is not None:
+        from colift.recording import atomic_path
+
+        with atomic_path(file) as temporary:
+            temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
+    if as_json:
+        emit(result)
+    else:
+        benchmark.show(result, out)
+
+
+def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
+    """Recording, metrics, resolved mission and report of one run, each written atomically."""
+    import tomli_w
+
+    from colift.recording import atomic_path
+
+    files = {"recording": flown.recording.save(folder / "recording.h5")}
+    for name, text in (
+        ("metrics", json.dumps(plain(flown.metrics), indent=2) + "\n"),
+        ("mission", tomli_w.dumps(flown.mission.resolved())),
+    ):
+        files[name] = folder / ("metrics.json" if name == "metrics" else "mission.toml")
+        with atomic_path(files[name]) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    if report:
+        from colift.report.html import write_report
+
+        files["report"] = write_report(flown.recording, folder, metrics=flown.metrics)
+    return files
+
+
+def plain(value: Any) -> Any:
+    """JSON-ready copy; a number that is not finite becomes null."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def emit(value: Any) -> None:
+    """Print one JSON object on standard output."""
+    print(json.dumps(plain(value), indent=2))
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Say so while compiled parts are loaded, which takes half a minute the first time."""
+    from colift.jit import compiled_before
+
+    if compiled_before():
+        yield
+        return
+    err.print("First run on this machine: compiling (about half a minute, then cached).")
+    with err.status("compiling"):
+        yield
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Report]:
+    """A progress bar on a terminal; silent elsewhere."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+        task = bar.add_task(escape(title), total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+def _slug(name: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)[:60]
+
+
+def main() -> None:
+    """Entry point: errors of ours become one clear message and an exit code."""
+    try:
+        app(standalone_mode=True)
+    except (MissionError, UnknownNameError) as error:
+        err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
+        sys.exit(EXIT_USAGE)
+    except ColiftError as error:
+        err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
+        sys.exit(EXIT_ERROR)
+    except KeyboardInterrupt:
+        err.print("interrupted; nothing half-written was left")
+        sys.exit(EXIT_INTERRUPTED)

@@ -1,0 +1,121 @@
+"""The figures of one flight, by name. A new figure is one function here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Generic, NamedTuple, TypeVar
+
+from matplotlib.figure import Figure
+
+from colift.recording import Recording
+from colift.report import panels, style
+
+Source = TypeVar("Source")
+
+
+class Entry(NamedTuple, Generic[Source]):
+    """One figure of the registry: its title, how to read it, and what draws it."""
+
+    title: str
+    caption: str
+    draw: Callable[[Source], Figure]
+
+
+def register(
+    table: dict[str, Entry[Source]], title: str, caption: str
+) -> Callable[[Callable[[Source], Figure]], Callable[[Source], Figure]]:
+    """Enter the decorated function, which from then on draws in the common style."""
+
+    def enter(function: Callable[[Source], Figure]) -> Callable[[Source], Figure]:
+        @wraps(function)
+        def draw(source: Source) -> Figure:
+            with style.look():
+                return function(source)
+
+        table[function.__name__] = Entry(title, caption, draw)
+        return draw
+
+    return enter
+
+
+FIGURES: dict[str, Entry[Recording]] = {}
+"""Every figure of one flight by name, in the order of the report."""
+
+
+@register(
+    FIGURES,
+    "Path",
+    "Wide grey: where the load should go. Black: where it went; the squares are the load and the "
+    "dots the drones at the times given, with their cables. All axes have the same scale.",
+)
+def path(recording: Recording) -> Figure:
+    figure = Figure(figsize=(style.WIDTH, 4.8))
+    axes = figure.add_axes((0.03, 0.03, 0.94, 0.93), projection="3d")
+    panels.path(axes, recording)
+    style.legend(figure)
+    return figure
+
+
+@register(
+    FIGURES,
+    "Position error",
+    "The load's position less its reference, by component. The grey band is plus and minus the "
+    "distance between the two, so it touches whatever component carries the whole error.",
+)
+def position_error(recording: Recording) -> Figure:
+    return _over_time(recording, panels.position_error)
+
+
+@register(
+    FIGURES,
+    "Cable tensions",
+    "Actual tension of each cable. Lines on top of each other mean an evenly shared load; "
+    "a line below zero means a cable that would be slack.",
+)
+def tensions(recording: Recording) -> Figure:
+    return _over_time(recording, panels.tensions)
+
+
+@register(
+    FIGURES,
+    "Angles between cables",
+    "Angle between every two actual cables; each line carries the colours of its two drones. "
+    "Drones come close where an angle falls below the dashed line at 30 degrees. More than ten "
+    "pairs are drawn as the range of all pairs, that of nearest neighbours, and the closest pair.",
+)
+def angles(recording: Recording) -> Figure:
+    return _over_time(recording, panels.angles)
+
+
+@register(
+    FIGURES,
+    "Wanted and actual tension",
+    "Above: actual tensions, with those that the allocator wanted dashed in black. Below: actual "
+    "less wanted tension, that is what the controllers did not follow.",
+)
+def tension_tracking(recording: Recording) -> Figure:
+    return _over_time(recording, panels.desired_tensions, panels.tension_error, height=1.75)
+
+
+@register(
+    FIGURES,
+    "Time of the allocator",
+    "How long one allocation took, measured in the loop; both axes are logarithmic. The worst "
+    "cases are mostly the operating system's interruptions.",
+)
+def allocator_time(recording: Recording) -> Figure:
+    figure, (axes,) = style.grid()
+    panels.allocator_time(axes, recording)
+    style.legend(figure)
+    return figure
+
+
+def _over_time(recording: Recording, *draw: panels.Panel, height: float = 2.3) -> Figure:
+    """Panels over the same time axis, one above the other."""
+    figure, axes = style.grid(rows=len(draw), height=height)
+    for k, (panel, part) in enumerate(zip(axes, draw, strict=True)):
+        panels.focus([panel], [part(panel, recording)])
+        panels.time_axis(panel, recording, label=k == len(draw) - 1)
+    style.legend(figure)
+    return figure

@@ -1,0 +1,235 @@
+"""Pages of one file: no script, no request, dark and light, wide and narrow."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from colift.metrics import all_metrics
+from colift.recording import Recording, atomic_path
+
+if TYPE_CHECKING:
+    from colift.report.render import Drawing
+    from colift.run import Run
+
+STYLE = """
+:root{color-scheme:light dark;--ink:#1d2126;--soft:#5c6670;--back:#fbfbfa;--card:#fff;--rule:#e2e4e6;
+--good:#1b7f4b;--warn:#a86400;--bad:#b3261e}
+@media (prefers-color-scheme:dark){:root{--ink:#e6e8ea;--soft:#9aa4ad;--back:#15181b;--card:#1d2125;
+--rule:#33393f;--good:#5fcf95;--warn:#f0b34a;--bad:#ff8a80}}
+*{box-sizing:border-box}
+body{margin:0 auto;padding:2rem 1.25rem 4rem;max-width:52rem;background:var(--back);color:var(--ink);
+font:1rem/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;
+overflow-wrap:break-word}
+h1{font-size:1.7rem;line-height:1.25;margin:0 0 .4rem}
+h2{font-size:1.15rem;margin:2.6rem 0 .7rem}
+p{margin:.5rem 0}
+.soft,figcaption,th{color:var(--soft)}
+.facts{display:flex;flex-wrap:wrap;gap:.35rem .5rem;padding:0;margin:1rem 0;list-style:none;
+font-size:.85rem}
+.facts li{border:1px solid var(--rule);border-radius:1rem;padding:.1rem .7rem}
+.banner{border-left:.35rem solid var(--tone);background:var(--card);padding:.7rem 1rem;
+border-radius:.25rem;margin:1.2rem 0;font-weight:600}
+.good{--tone:var(--good)}.warn{--tone:var(--warn)}.bad{--tone:var(--bad)}
+.scroll{overflow-x:auto}
+table{border-collapse:collapse;width:100%;font-size:.92rem}
+th{text-align:left;font-weight:600;font-size:.82rem}
+th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule);vertical-align:top}
+th:last-child,td:last-child{padding-right:0}
+.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
+code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,"DejaVu Sans Mono",monospace}
+td code{color:var(--soft)}
+figure{margin:0 0 2.2rem}
+figure .scroll{background:#fff;border:1px solid var(--rule);border-radius:.4rem;padding:.5rem}
+figure svg,figure img{display:block;width:100%;height:auto;min-width:30rem}
+figcaption{font-size:.9rem;margin-top:.5rem}
+figcaption b{color:var(--ink)}
+details{border:1px solid var(--rule);border-radius:.4rem;background:var(--card);padding:.6rem 1rem;
+margin:.6rem 0}
+summary{cursor:pointer;font-weight:600}
+pre{overflow-x:auto;margin:.7rem 0 .2rem}
+@media (max-width:40rem){body{padding:1.2rem .9rem 3rem}h1{font-size:1.4rem}}
+@media print{body{max-width:none}figure{break-inside:avoid}}
+"""
+
+
+def page(title: str, body: str) -> str:
+    """A whole document in the common style; ``title`` is text, ``body`` is HTML."""
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
+        f"<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """A table; ``header`` is text, cells are HTML; columns listed in ``numbers`` align right."""
+    look = ['class="number"' if k in numbers else "" for k in range(len(header))]
+    head = "".join(f"<th {c}>{escape(t)}</th>" for c, t in zip(look, header, strict=True))
+    body = "\n".join(
+        "<tr>" + "".join(f"<td {c}>{t}</td>" for c, t in zip(look, row, strict=True)) + "</tr>"
+        for row in rows
+    )
+    text = f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
+    return f'<div class="scroll">{text}</div>'.replace("<th >", "<th>").replace("<td >", "<td>")
+
+
+def banner(level: str, text: str) -> str:
+    """One sentence that stands out; ``level`` is good, warn or bad."""
+    return f'<p class="banner {level}">{escape(text)}</p>'
+
+
+def facts(values: Iterable[str]) -> str:
+    """A line of short facts."""
+    return '<ul class="facts">' + "".join(f"<li>{escape(v)}</li>" for v in values) + "</ul>"
+
+
+def figure(drawing: Drawing) -> str:
+    """A figure on a white card with its caption."""
+    return (
+        f'<figure>\n<div class="scroll">{drawing.inline()}</div>\n'
+        f"<figcaption><b>{escape(drawing.title)}.</b> {escape(drawing.caption)}</figcaption>\n</figure>"
+    )
+
+
+def details(summary: str, text: str) -> str:
+    """Preformatted text that opens on demand."""
+    return f"<details><summary>{escape(summary)}</summary><pre>{escape(text)}</pre></details>"
+
+
+def write_report(
+    source: Run | Recording, folder: str | Path, *, metrics: Mapping[str, float]
+) -> Path:
+    """Write ``report.html`` and ``figures/<name>.png`` and ``.svg`` of one flight.
+
+    Parameters
+    ----------
+    source : Run or Recording
+        What was flown.
+    folder : path
+        Created if missing; files of the same name are replaced, each only by a whole one.
+    metrics : mapping
+        As from :func:`colift.metrics.compute`.
+
+    Returns
+    -------
+    Path
+        The page; it needs none of the other files. Equal recordings give equal bytes.
+    """
+    from colift.report.figures import FIGURES
+    from colift.report.render import draw
+
+    recording = source if isinstance(source, Recording) else source.recording
+    folder = Path(folder)
+    drawings = draw(FIGURES, recording)
+    for drawing in drawings:
+        drawing.save(folder / "figures")
+    target = folder / "report.html"
+    with atomic_path(target) as temporary:
+        temporary.write_text(report(recording, metrics, drawings), encoding="utf-8", newline="\n")
+    return target
+
+
+def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequence[Drawing]) -> str:
+    """The page of one flight."""
+    mission = recording.mission
+    kinds = ", ".join(f"{layer} {kind}" for layer, kind in mission.kinds.items())
+    versions = "\n".join(f"{name:9} {text}" for name, text in recording.versions.items())
+    parts = [
+        f"<header><h1>{escape(mission.name)}</h1>",
+        f'<p class="soft">{escape(mission.description)}</p></header>',
+        banner(*verdict(recording, metrics)),
+        facts(
+            [
+                f"{recording.n} drone{'s' * (recording.n != 1)}",
+                f"load {mission.load.mass:g} kg",
+                f"{mission.timing.duration:g} s",
+                f"reference {mission.kinds['reference']}",
+                f"allocator {mission.kinds['allocation']}",
+                f"seed {mission.seed}",
+                f"colift {recording.versions.get('colift', '?')}",
+            ]
+        ),
+        "<h2>Numbers</h2>",
+        metrics_table(metrics),
+        "<h2>Figures</h2>",
+        *map(figure, drawings),
+        "<h2>Provenance</h2>",
+        f'<p class="soft">Parts: {escape(kinds)}. Seed {mission.seed}.</p>',
+        details(
+            "Mission as flown, every default filled in (a valid mission file)",
+            toml(mission.resolved()),
+        ),
+        details("Versions", versions),
+    ]
+    return page(f"{mission.name} - colift", "\n".join(part for part in parts if part))
+
+
+def metrics_table(metrics: Mapping[str, float]) -> str:
+    """Every metric with its meaning, value and unit."""
+    rows = []
+    for metric in all_metrics():
+        if metric.name in metrics:
+            value, unit = quantity(metrics[metric.name], metric.unit)
+            meaning = metric.meaning[:1].upper() + metric.meaning[1:]
+            rows.append((f"{escape(meaning)}<br><code>{escape(metric.name)}</code>", value, unit))
+    return table(("Quantity", "Value", "Unit"), rows, numbers=(1,))
+
+
+def quantity(value: float, unit: str) -> tuple[str, str]:
+    """A value and its unit for reading: lengths below a metre in cm, no unit for pure numbers."""
+    if math.isnan(value):
+        return "does not apply", ""
+    if unit == "m" and abs(value) < 1.0:
+        value, unit = 100.0 * value, "cm"
+    return f"{value:.4g}", {"1": "", "us": "µs", "deg": "°"}.get(unit, unit)
+
+
+def verdict(recording: Recording, metrics: Mapping[str, float]) -> tuple[str, str]:
+    """How the flight went, as a level (good, warn or bad) and a sentence."""
+    from colift.report.panels import SAFE_ANGLE
+
+    level = "good" if recording.outcome == "completed" else "bad"
+    words = [recording.outcome[:1].upper() + recording.outcome[1:]]
+    slack = metrics.get("slack_time_s", math.nan)
+    if slack == 0.0:
+        words.append("no slack")
+    elif slack > 0.0:
+        words.append(f"slack cables for {slack:.3g} s")
+        level = "bad" if level == "bad" else "warn"
+    angle = metrics.get("min_angle_deg", math.nan)
+    if angle >= SAFE_ANGLE:
+        words.append(f"smallest angle {angle:.1f} deg")
+    elif angle < SAFE_ANGLE:
+        words.append(f"smallest angle {angle:.1f} deg, below {SAFE_ANGLE:g} deg")
+        level = "bad" if level == "bad" else "warn"
+    error = metrics.get("tracking_max_m", math.nan)
+    if math.isfinite(error) and recording.outcome == "completed":
+        words.append(f"load within {100.0 * error:.2g} cm of its reference")
+    failures = metrics.get("allocator_failures", 0.0)
+    if failures > 0:
+        words.append(f"{failures:.0f} allocations not ok")
+        level = "bad" if level == "bad" else "warn"
+    return level, "; ".join(words) + "."
+
+
+def toml(data: Mapping[str, Any], prefix: str = "") -> str:
+    """Plain data as TOML: first the values of a table, then its tables."""
+    lines, tables = [], []
+    for key, value in data.items():
+        name = key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key)
+        if isinstance(value, Mapping):
+            path = f"{prefix}{name}"
+            tables.append(f"\n[{path}]\n{toml(value, f'{path}.')}")
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            path = f"{prefix}{name}"
+            tables += [f"\n[[{path}]]\n{toml(row, f'{path}.')}" for row in value]
+        else:
+            lines.append(f"{name} = {json.dumps(value, ensure_ascii=False)}\n")
+    return "".join(lines + tables)

@@ -1,0 +1,167 @@
+"""The one look of every figure: colours, line styles, sizes, margins, legends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+PALETTE = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#7F6000",
+    "#5D3A9B",
+)
+"""Colours that remain distinct with any colour vision (Okabe and Ito, darker where they were pale)."""
+
+DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (1.2, 1.2)),
+    (0, (6, 1.5, 1.2, 1.5)),
+    (0, (9, 2)),
+    (0, (3, 1, 1, 1, 1, 1)),
+    (0, (2.5, 2.5)),
+    (0, (9, 1.5, 1.2, 1.5, 1.2, 1.5)),
+)
+"""Line styles, one for each turn through the palette."""
+
+SERIES = ("#000000", "#35608D", "#1FA187", "#B5A000", "#8B2F6F")
+"""Colours of whole recordings in a comparison; none of them stands for a drone."""
+
+COMPONENTS = ("#BB5566", "#004488", "#DDAA33")
+"""Colours of x, y and z."""
+
+INK, MUTED, LIMIT = "#222222", "#B8B8B8", "#AA0000"
+"""Flown and measured; wanted and secondary; thresholds."""
+
+MANY = 10
+"""Above so many lines of a kind, a band shows their range instead."""
+
+WIDTH, LEFT = 7.0, 0.75
+"""Width of a figure and of its left margin, inches."""
+
+DPI = 150
+"""Resolution of bitmaps, dots per inch."""
+
+_RC: Any = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": "#666666",
+    "axes.grid": True,
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 9.5,
+    "axes.unicode_minus": True,
+    "axes.xmargin": 0.0,
+    "figure.facecolor": "white",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Helvetica", "Arial"],
+    "font.size": 9,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.6,
+    "legend.borderaxespad": 0.0,
+    "legend.borderpad": 0.0,
+    "legend.columnspacing": 1.3,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.handletextpad": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.solid_capstyle": "round",
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+    "xtick.color": "#444444",
+    "xtick.major.width": 0.7,
+    "ytick.color": "#444444",
+    "ytick.major.width": 0.7,
+}
+
+
+@contextmanager
+def look(salt: str = "") -> Iterator[None]:
+    """Draw and save in this style, whatever the user's own settings; ``salt`` makes SVG ids stable."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_RC | {"svg.hashsalt": salt or "colift"})
+        yield
+
+
+def drone(i: int) -> dict[str, Any]:
+    """Colour and line style of drone ``i`` (from 0), the same in every figure."""
+    turn, colour = divmod(i, len(PALETTE))
+    return {"color": PALETTE[colour], "linestyle": DASHES[turn % len(DASHES)]}
+
+
+def drone_label(i: int) -> str:
+    """Legend text of drone ``i``; only the first spells the word, to keep the legend short."""
+    return f"drone {i + 1}" if i == 0 else f"{i + 1}"
+
+
+def series(k: int) -> dict[str, Any]:
+    """Colour and line style of the ``k``-th recording of a comparison."""
+    turn, colour = divmod(k, len(SERIES))
+    return {"color": SERIES[colour], "linestyle": DASHES[turn % len(DASHES)]}
+
+
+def grid(
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    height: float = 2.3,
+    titles: bool = False,
+    share: bool = True,
+) -> tuple[Figure, list[Axes]]:
+    """A white figure with ``rows`` x ``columns`` axes, each ``height`` inches high, row by row.
+
+    Margins are fixed in inches: room for labels left and below, for one line of legend on top and,
+    if asked, for titles above the axes. With ``share``, the panels of a row have one vertical axis.
+    """
+    left, right, bottom, top, gap = LEFT, 0.22, 0.48, 0.36 + 0.24 * titles, 0.16
+    between = 0.2 if share else 0.75
+    total = top + rows * height + (rows - 1) * gap + bottom
+    width = (WIDTH - left - right - (columns - 1) * between) / columns
+    figure = Figure(figsize=(WIDTH, total))
+    axes: list[Axes] = []
+    for k in range(rows * columns):
+        i, j = divmod(k, columns)
+        x = left + j * (width + between)
+        y = bottom + (rows - 1 - i) * (height + gap)
+        panel = figure.add_axes(
+            (x / WIDTH, y / total, width / WIDTH, height / total),
+            sharex=axes[j] if i else None,
+            sharey=axes[i * columns] if j and share else None,
+        )
+        panel.locator_params(axis="x", nbins=5, steps=[1, 2, 5, 10])
+        panel.locator_params(axis="y", nbins=6)
+        panel.tick_params(labelbottom=i == rows - 1, labelleft=j == 0 or not share, length=3)
+        axes.append(panel)
+    return figure, axes
+
+
+def legend(figure: Figure) -> None:
+    """One line of legend on top of the figure, clear of every line: each label of any axes once."""
+    found: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(str(label), handle)
+    if found:
+        figure.legend(
+            list(found.values()),
+            list(found),
+            loc="upper left",
+            bbox_to_anchor=(LEFT / WIDTH, 1.0 - 0.09 / figure.get_figheight()),
+            ncols=len(found),
+            **(
+                {"fontsize": 8, "columnspacing": 0.8, "handlelength": 1.3} if len(found) > 8 else {}
+            ),
+        )
