@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from colift.errors import ColiftError, MissionError
     from colift.mission import Mission, load_mission
     from colift.recording import Recording
-    from colift.run import Run, run
+    from colift.runner import Run, run
     from colift.team import Team
 
 # Resolved on first use: importing a kernel's module loads (the first time: compiles) it.
@@ -22,12 +22,12 @@ _HOMES = {
     "Mission": "colift.mission",
     "MissionError": "colift.errors",
     "Recording": "colift.recording",
-    "Run": "colift.run",
+    "Run": "colift.runner",
     "SqpAllocator": "colift.allocation.sqp",
     "Status": "colift.allocation.base",
     "Team": "colift.team",
     "load_mission": "colift.mission",
-    "run": "colift.run",
+    "run": "colift.runner",
 }
 
 __all__ = [

@@ -25,7 +25,7 @@ from colift.allocation.sqp import Sqp, SqpAllocator
 from colift.geometry import Array, ring
 from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector
 from colift.recording import versions
-from colift.run import run as fly
+from colift.runner import run as fly
 from colift.team import Team
 
 if TYPE_CHECKING:
@@ -37,7 +37,18 @@ LARGEST_SLSQP = 64
 
 
 @kernel(
-    i8(types.FunctionType(SIGNATURE), matrix, vector, f8, vector, vector, vector, matrix, vector, matrix)
+    i8(
+        types.FunctionType(SIGNATURE),
+        matrix,
+        vector,
+        f8,
+        vector,
+        vector,
+        vector,
+        matrix,
+        vector,
+        matrix,
+    )
 )
 def _time_calls(  # type: ignore[no-untyped-def]
     allocate, forces, acceleration, dt, params, memory, tensions, directions, info, out
@@ -46,9 +57,7 @@ def _time_calls(  # type: ignore[no-untyped-def]
     failures = 0
     for k in range(forces.shape[0]):
         begin = monotonic_ns()
-        status = allocate(
-            forces[k], acceleration, dt, params, memory, tensions, directions, info
-        )
+        status = allocate(forces[k], acceleration, dt, params, memory, tensions, directions, info)
         end = monotonic_ns()
         out[k, 0] = end - begin
         out[k, 1] = info[0]
@@ -195,16 +204,20 @@ def machine() -> dict[str, Any]:
     model = platform.processor()
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
-            model = next(line.split(":", 1)[1].strip() for line in file if line.startswith("model name"))
+            model = next(
+                line.split(":", 1)[1].strip() for line in file if line.startswith("model name")
+            )
     except (OSError, StopIteration):
         pass
     return {"processor": model, "cores": os.cpu_count(), **versions()}
 
 
-def run(counts: list[int], *, quick: bool = False, progress: Progress | None = None) -> dict[str, Any]:
+def run(
+    counts: list[int], *, quick: bool = False, progress: Progress | None = None
+) -> dict[str, Any]:
     """All benchmarks as plain data."""
     rows = []
-    report: Callable[[float], None] = progress or (lambda fraction: None)
+    report: Callable[[float], None] = progress or (lambda _: None)
     for k, n in enumerate(counts):
         budget = 2_000 if quick else 20_000
         row: dict[str, Any] = {"n": n, "loop": in_loop(n, max(200, budget * 16 // max(16, n)))}
@@ -215,15 +228,31 @@ def run(counts: list[int], *, quick: bool = False, progress: Progress | None = N
                 row["slsqp_ratio"] = row["slsqp"]["median_us"] / row["loop"]["median_us"]
         rows.append(row)
         report((k + 1) / (len(counts) + 1))
-    result = {"machine": machine(), "allocator": rows, "closed_loop": closed_loop(3 if quick else 9)}
+    result = {
+        "machine": machine(),
+        "allocator": rows,
+        "closed_loop": closed_loop(3 if quick else 9),
+    }
     report(1.0)
     return result
 
 
 def show(result: dict[str, Any], console: Console) -> None:
     """Print the benchmarks as tables."""
-    table = Table(title="The paper's problem, warm-started along a smooth force", title_justify="left")
-    for name in ("n", "loop median us", "p99", "worst", "iterations", "worst KKT", "python us", "SLSQP us", "ratio"):
+    table = Table(
+        title="The paper's problem, warm-started along a smooth force", title_justify="left"
+    )
+    for name in (
+        "n",
+        "loop median us",
+        "p99",
+        "worst",
+        "iterations",
+        "worst KKT",
+        "python us",
+        "SLSQP us",
+        "ratio",
+    ):
         table.add_column(name, justify="right")
     for row in result["allocator"]:
         loop, other = row["loop"], row.get("slsqp")
@@ -246,4 +275,6 @@ def show(result: dict[str, Any], console: Console) -> None:
         f"Closed loop, paper-spiral, {loop['simulated_s']:g} s recorded: median {loop['median_s']:.3f} s "
         f"of {loop['repetitions']}, worst {loop['worst_s']:.3f} s."
     )
-    console.print(", ".join(f"{key} {value}" for key, value in result["machine"].items()), style="dim")
+    console.print(
+        ", ".join(f"{key} {value}" for key, value in result["machine"].items()), style="dim"
+    )

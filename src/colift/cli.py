@@ -42,7 +42,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Sets = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Change any field of the mission, e.g. allocation.mu=0.75."
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change any field of the mission, e.g. allocation.mu=0.75.",
     ),
 ]
 With = Annotated[
@@ -83,7 +85,9 @@ def run(
         for path in extra or []:
             load_file(path)
         overrides = dict(parse_override(text) for text in sets or [])
-        loaded = colift.load_mission(mission, {**overrides, **({} if seed is None else {"seed": seed})})
+        loaded = colift.load_mission(
+            mission, {**overrides, **({} if seed is None else {"seed": seed})}
+        )
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
     target = folder or Path("runs") / f"{_slug(loaded.name)}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -100,7 +104,9 @@ def run(
             }
         )
     else:
-        table = Table(title=escape(f"{loaded.name}: {flown.recording.outcome}"), title_justify="left")
+        table = Table(
+            title=escape(f"{loaded.name}: {flown.recording.outcome}"), title_justify="left"
+        )
         table.add_column("metric")
         table.add_column("value", justify="right")
         table.add_column("unit")
@@ -148,7 +154,9 @@ def reproduce(
         table.add_column("ours", justify="right")
         table.add_column("verdict", ratio=4)
         for row in rows:
-            table.add_row(escape(row.quantity), row.paper_text, row.ours_text, escape(row.verdict_text))
+            table.add_row(
+                escape(row.quantity), row.paper_text, row.ours_text, escape(row.verdict_text)
+            )
         out.print(table)
     for name, path in files.items():
         out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
@@ -288,7 +296,7 @@ def _slug(name: str) -> str:
 def main() -> None:
     """Entry point: errors of ours become one clear message and an exit code."""
     try:
-        app(standalone_mode=True)
+        app()
     except (MissionError, UnknownNameError) as error:
         err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(EXIT_USAGE)

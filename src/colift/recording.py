@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.errors import RecordingError
+from colift.errors import MissionError, RecordingError
 from colift.mission.load import load_mission
 from colift.mission.schema import Mission
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
@@ -76,6 +76,7 @@ class Recording(Mapping[str, Array]):
         Times of the allocations, s.
     outcome : str
         ``"completed"``, or how the flight ended.
+
     """
 
     mission: Mission
@@ -139,6 +140,7 @@ class Recording(Mapping[str, Array]):
         ------
         RecordingError
             If the file is missing, no HDF5 file, no colift recording, or lacks a signal.
+
         """
         import h5py
 
@@ -152,14 +154,14 @@ class Recording(Mapping[str, Array]):
                     target = "solve_time" if short == "time" else short
                     arrays[signal.name] = file[f"allocator/{target}"][()]
                 return cls(
-                    mission=load_mission(json.loads(file.attrs["mission"])),
+                    mission=load_mission(dict(json.loads(file.attrs["mission"]))),
                     time=file["time"][()],
                     cycle_time=file["allocator/time"][()],
                     arrays=arrays,
                     outcome=str(file.attrs["outcome"]),
                     versions=json.loads(file.attrs["versions"]),
                 )
-        except (OSError, KeyError) as error:
+        except (OSError, KeyError, ValueError, TypeError, MissionError) as error:
             raise RecordingError(f"{path}: cannot be read as a recording: {error}") from error
 
 

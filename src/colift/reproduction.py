@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colift.geometry import Array, pairwise_angles, ring
-from colift.metrics import tracking_error
-from colift.run import Run, run
+from colift.runner import Run, run
 
 if TYPE_CHECKING:
     from colift.simulation.flight import Progress
@@ -205,14 +204,24 @@ def _separation(flights: dict[str, Run]) -> Iterator[Row]:
         else:
             verdict, why = "differs", "smaller than printed"
         yield Row(
-            section, f"smallest angle, SQP, mu = {mu}", "deg", paper, ours, verdict, why, command_of(name)
+            section,
+            f"smallest angle, SQP, mu = {mu}",
+            "deg",
+            paper,
+            ours,
+            verdict,
+            why,
+            command_of(name),
         )
     for name, label in (("lopsided", "lopsided"), ("ring", "symmetric 35 deg ring")):
         flown = flights[name]
         smallest = pairwise_angles(flown.recording["directions"]).min(axis=1)
         below = float(np.mean(np.degrees(smallest) < THRESHOLD_DEG)) * 100
         if name == "lopsided":
-            verdict, why = ("reproduced" if below > 50 else "differs"), "paper: frequently below 30 deg"
+            verdict, why = (
+                ("reproduced" if below > 50 else "differs"),
+                "paper: frequently below 30 deg",
+            )
         else:
             verdict, why = "shown", "a symmetric fixed ring does not have the problem"
         yield Row(
@@ -252,7 +261,11 @@ def _tension(flights: dict[str, Run]) -> Iterator[Row]:
         f"paper: close alignment; {100 * m['tension_tracking_rms_N'] / (mean / 4):.1f} % of a cable's mean tension",
         command_of("sqp-0.15"),
     )  # fmt: skip
-    for name, label in (("sqp-0.15", "SQP"), ("lopsided", "lopsided baseline"), ("ring", "ring baseline")):
+    for name, label in (
+        ("sqp-0.15", "SQP"),
+        ("lopsided", "lopsided baseline"),
+        ("ring", "ring baseline"),
+    ):
         ours = flights[name].metrics["tension_imbalance"]
         says = {
             "sqp-0.15": (ours < 1.1, "paper: balanced among all four"),
@@ -263,7 +276,9 @@ def _tension(flights: dict[str, Run]) -> Iterator[Row]:
             section, f"largest over smallest mean tension, {label}", "", None, ours, verdict,
             says[1] if says else "not in the paper", command_of(name),
         )  # fmt: skip
-    extra = (flights["ring"].metrics["tension_integral_10s_Ns"] / m["tension_integral_10s_Ns"] - 1) * 100
+    extra = (
+        flights["ring"].metrics["tension_integral_10s_Ns"] / m["tension_integral_10s_Ns"] - 1
+    ) * 100
     yield Row(
         section, "J_T over 10 s of the ring baseline against SQP, mu = 0.15", "%", None, extra, "shown",
         "a fixed symmetric ring costs hardly more; the paper's comparison rests on its baseline",
@@ -282,7 +297,13 @@ def _timing(flights: dict[str, Run]) -> Iterator[Row]:
     ):
         ours = m[key] / 1000
         yield Row(
-            section, label, "ms", paper, ours, *smaller_is_better(ours, paper, why), command_of("sqp-0.15")
+            section,
+            label,
+            "ms",
+            paper,
+            ours,
+            *smaller_is_better(ours, paper, why),
+            command_of("sqp-0.15"),
         )
 
 

@@ -24,6 +24,7 @@ class Team:
         m.
     gravity : float
         m/s^2, along -z of the world frame.
+
     """
 
     load_mass: float

@@ -95,6 +95,7 @@ class Allocation:
         ``|sum T_i alpha_i + F|``, N.
     solve_time : float
         s, of the kernel call.
+
     """
 
     __slots__ = ("_info", "directions", "solve_time", "status", "tensions")
@@ -157,6 +158,7 @@ class Allocator:
         Half-angle of the ring that :meth:`reset` starts from.
     dt : float
         Time between two calls, s; only allocators that limit rates use it.
+
     """
 
     def __init__(
@@ -184,9 +186,7 @@ class Allocator:
         """Number of cables."""
         return self.team.n
 
-    def reset(
-        self, directions: ArrayLike | None = None, tensions: ArrayLike | None = None
-    ) -> None:
+    def reset(self, directions: ArrayLike | None = None, tensions: ArrayLike | None = None) -> None:
         """Forget the last answer and start from the given one, or from the default ring.
 
         Parameters
@@ -200,6 +200,7 @@ class Allocator:
         ------
         ValueError
             For a wrong shape, a value that is not finite, a zero direction or a negative tension.
+
         """
         n = self.n
         start = ring(n, self._cone) if directions is None else np.array(directions, dtype=float)
@@ -225,6 +226,7 @@ class Allocator:
         ------
         pydantic.ValidationError
             For an unknown setting or a value out of range; nothing is changed then.
+
         """
         fields = {**self.part.model_dump(), **settings}
         self.part = type(self.part).model_validate(fields)
@@ -250,6 +252,7 @@ class Allocator:
         ------
         ValueError
             Only when ``force`` or ``acceleration`` does not have three components.
+
         """
         wanted = np.asarray(force, dtype=float)
         if wanted.shape != (3,):

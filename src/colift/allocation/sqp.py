@@ -55,7 +55,7 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
         info[INFO_OBJECTIVE] = math.nan
         info[INFO_BALANCE] = math.nan
         return _INVALID_FORCE
-    if W <= 1e-9 * math.sqrt(mu) or W <= 1e-12:
+    if 1e-9 * math.sqrt(mu) >= W or W <= 1e-12:
         for i in range(n):
             T[i] = 0.0
         memory[0] = 0.0
@@ -130,7 +130,7 @@ class Sqp(AllocatorPart):
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""
-    tolerance: Annotated[float, Field(ge=1e-13, le=1e-3)] = 1e-8
+    tolerance: Annotated[float, Field(ge=1e-11, le=1e-3)] = 1e-8
     """KKT residual (relative) at which the iteration stops."""
     max_iterations: Annotated[int, Field(ge=1, le=1000)] = 50
     """Most Newton steps in one call."""

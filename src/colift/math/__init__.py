@@ -1,0 +1,1 @@
+"""Mathematics that several kernels share; compiled, imports nothing of colift but `jit`."""

@@ -53,6 +53,7 @@ def read_source(source: str | Path) -> tuple[str, dict[str, Any]]:
         If it is neither.
     MissionError
         If the file cannot be read or is not TOML.
+
     """
     path = Path(source)
     if path.suffix == ".toml" or os.path.isfile(path):
@@ -90,6 +91,7 @@ def load_mission(
         With every problem found: path, value, allowed range.
     UnknownNameError
         If ``source`` names no shipped mission and no file.
+
     """
     if isinstance(source, Mapping):
         label, table = "mission", _plain(source)

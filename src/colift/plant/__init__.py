@@ -1,0 +1,1 @@
+"""Plants: the simulated truth (paper section 2.1)."""

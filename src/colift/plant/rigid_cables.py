@@ -129,10 +129,7 @@ def project(n, y):  # type: ignore[no-untyped-def]
         y[o + 4] -= along * y[o + 1]
         y[o + 5] -= along * y[o + 2]
         scale = 1.0 / math.sqrt(
-            y[o + 6] * y[o + 6]
-            + y[o + 7] * y[o + 7]
-            + y[o + 8] * y[o + 8]
-            + y[o + 9] * y[o + 9]
+            y[o + 6] * y[o + 6] + y[o + 7] * y[o + 7] + y[o + 8] * y[o + 8] + y[o + 9] * y[o + 9]
         )
         for k in range(6, 10):
             y[o + k] *= scale

@@ -1,0 +1,1 @@
+"""References: where the load should be, with three derivatives."""

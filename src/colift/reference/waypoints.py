@@ -43,10 +43,9 @@ class Waypoints(ReferencePart):
 
     kernel = _waypoints
 
-    points: Annotated[list[tuple[float, float, float]], Field(min_length=1, max_length=1000)] = [
-        (0.0, 0.0, 1.0),
-        (2.0, 1.0, 1.5),
-    ]
+    points: Annotated[
+        tuple[tuple[float, float, float], ...], Field(min_length=1, max_length=1000)
+    ] = ((0.0, 0.0, 1.0), (2.0, 1.0, 1.5))
     """Waypoints, world frame, m; the load starts at the first."""
     travel: Annotated[float, Field(gt=0.0)] = 4.0
     """Time from one waypoint to the next, s."""

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from colift.recording import Recording
 from colift.report import panels, style
 
-Source = TypeVar("Source")
+Source = TypeVar("Source", contravariant=True)
 
 
 class Entry(NamedTuple, Generic[Source]):
@@ -71,7 +71,8 @@ def position_error(recording: Recording) -> Figure:
     FIGURES,
     "Cable tensions",
     "Actual tension of each cable. Lines on top of each other mean an evenly shared load; "
-    "a line below zero means a cable that would be slack.",
+    'a line below zero means a cable that would be slack. A note "off scale" gives the whole range '
+    "where short peaks leave the axis.",
 )
 def tensions(recording: Recording) -> Figure:
     return _over_time(recording, panels.tensions)
@@ -101,8 +102,8 @@ def tension_tracking(recording: Recording) -> Figure:
 @register(
     FIGURES,
     "Time of the allocator",
-    "How long one allocation took, measured in the loop; both axes are logarithmic. The worst "
-    "cases are mostly the operating system's interruptions.",
+    "How long one allocation took, measured in the loop; both axes are logarithmic. Rare "
+    "slow ones are usually interruptions by the operating system.",
 )
 def allocator_time(recording: Recording) -> Figure:
     figure, (axes,) = style.grid()

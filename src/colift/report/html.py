@@ -15,7 +15,7 @@ from colift.recording import Recording, atomic_path
 
 if TYPE_CHECKING:
     from colift.report.render import Drawing
-    from colift.run import Run
+    from colift.runner import Run
 
 STYLE = """
 :root{color-scheme:light dark;--ink:#1d2126;--soft:#5c6670;--back:#fbfbfa;--card:#fff;--rule:#e2e4e6;
@@ -121,6 +121,7 @@ def write_report(
     -------
     Path
         The page; it needs none of the other files. Equal recordings give equal bytes.
+
     """
     from colift.report.figures import FIGURES
     from colift.report.render import draw

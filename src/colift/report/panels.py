@@ -88,6 +88,8 @@ def intact(recording: Recording) -> Recording:
         name: values if name.startswith("allocator_") else values[:rows]
         for name, values in recording.arrays.items()
     }
+    if not good[0]:  # nothing to show; zeros can be drawn
+        arrays |= {name: np.zeros_like(arrays[name]) for name in names}
     return replace(recording, time=recording.time[:rows], arrays=arrays)
 
 
@@ -134,7 +136,7 @@ def focus(panels: Sequence[Axes], values: Sequence[Array]) -> None:
     low, high = flat.min(), flat.max()
     inner, outer = np.quantile(flat, (0.01, 0.99))
     middle, size = (inner + outer) / 2.0, max(1.5 * (outer - inner), (high - low) / 6.0)
-    if high - low < 2.5 * size:
+    if high - low <= 2.5 * size:
         return
     bottom, top = max(low, middle - size / 2.0), min(high, middle + size / 2.0)
     box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import matplotlib as mpl
@@ -79,6 +80,7 @@ _RC: Any = {
     "lines.linewidth": 1.2,
     "lines.solid_capstyle": "round",
     "svg.fonttype": "none",
+    "svg.hashsalt": "colift",
     "text.parse_math": False,
     "xtick.color": "#444444",
     "xtick.major.width": 0.7,
@@ -87,13 +89,23 @@ _RC: Any = {
 }
 
 
+_active: ContextVar[bool] = ContextVar("active", default=False)
+
+
 @contextmanager
-def look(salt: str = "") -> Iterator[None]:
-    """Draw and save in this style, whatever the user's own settings; ``salt`` makes SVG ids stable."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(_RC | {"svg.hashsalt": salt or "colift"})
+def look() -> Iterator[None]:
+    """Draw and save in this style, whatever the user's own settings; blocks may nest."""
+    if _active.get():
         yield
+        return
+    token = _active.set(True)
+    try:
+        with mpl.rc_context():
+            mpl.rcdefaults()
+            mpl.rcParams.update(_RC)
+            yield
+    finally:
+        _active.reset(token)
 
 
 def drone(i: int) -> dict[str, Any]:

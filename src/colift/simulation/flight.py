@@ -34,6 +34,7 @@ class Flight:
         Whether every part is compiled, and so the loop.
     loop_time : float
         Wall time spent in the loop so far, s.
+
     """
 
     def __init__(self, mission: Mission) -> None:
@@ -119,7 +120,9 @@ class Flight:
         step, steps = self._every.step, self.mission.timing.steps
         chunk = max(1, round(CHUNK / step))
         events = {self._event_step(event.at) for event in self.mission.events}
-        return sorted(s for s in {*range(chunk, steps, chunk), *events, steps} if self._step < s <= steps)
+        return sorted(
+            s for s in {*range(chunk, steps, chunk), *events, steps} if self._step < s <= steps
+        )
 
     def _event_step(self, at: float) -> int:
         return round(at / self._every.step)

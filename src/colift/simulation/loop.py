@@ -21,7 +21,7 @@ from colift.load_control import base as load_control
 from colift.plant import base as plant
 from colift.position_control import base as position_control
 from colift.reference import base as reference
-from colift.simulation.signals import BUS_TYPE, CYCLE_SIGNALS, Bus
+from colift.simulation.signals import BUS_TYPE, CYCLE_SIGNALS
 
 Array = NDArray[np.float64]
 

@@ -27,6 +27,7 @@ class Run:
         Wall time of the closed loop, s.
     compiled : bool
         Whether the loop ran compiled; false when a part is plain Python.
+
     """
 
     recording: Recording
@@ -80,6 +81,7 @@ def run(
     ------
     colift.errors.MissionError
         With every mistake found in the mission or the overrides; nothing has been flown then.
+
     """
     if isinstance(mission, Mission):
         mission = mission.resolved()

@@ -1,0 +1,5 @@
+"""`python -m colift` is the `colift` command."""
+
+from colift.cli import main
+
+main()

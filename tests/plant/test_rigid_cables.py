@@ -1,0 +1,415 @@
+"""The rigid-cable plant: closed forms, conserved quantities, integrator order, and an oracle.
+
+The oracle knows nothing of the plant's formulas: point masses in world coordinates, one holonomic
+constraint a cable, Lagrange multipliers from one dense linear system.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import colift
+from colift.geometry import ring
+from colift.plant.base import Start
+from colift.plant.rigid_cables import RigidCables, derivative, state_size
+from colift.team import Team
+
+E3 = np.array([0.0, 0.0, 1.0])
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def rotation(q):
+    """Rotation matrix of a unit quaternion wxyz, by Rodrigues' formula."""
+    w, v = q[0], q[1:]
+    skew = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew
+
+
+def oracle(team, directions, direction_rates, attitudes, thrusts, external):
+    """Accelerations of load and drones (n + 1, 3) and tensions (n,) from a dense KKT system."""
+    n = team.n
+    mass = np.repeat(np.append(team.masses, team.load_mass), 3)
+    force = external.copy()
+    force[:n] += [f * rotation(q) @ E3 for f, q in zip(thrusts, attitudes, strict=True)]
+    force[:, 2] -= mass[::3] * team.gravity
+    jacobian = np.zeros((n, 3 * n + 3))  # of |x_L - x_i|^2 / 2
+    rows = np.zeros(n)
+    for i, length in enumerate(team.cable_lengths):
+        span = length * directions[i]
+        jacobian[i, 3 * i : 3 * i + 3] = -span
+        jacobian[i, 3 * n :] = span
+        rows[i] = -np.sum((length * direction_rates[i]) ** 2)
+    system = np.block([[np.diag(mass), jacobian.T], [jacobian, np.zeros((n, n))]])
+    answer = np.linalg.solve(system, np.append(force.ravel(), rows))
+    return answer[: 3 * n + 3].reshape(n + 1, 3), answer[3 * n + 3 :] * team.cable_lengths
+
+
+class Rig:
+    """A plant and its team outside of any loop."""
+
+    def __init__(self, team, directions, *, spin=None, attitudes=None, body_rates=None):
+        n = team.n
+        self.team, self.n, self.part = team, n, RigidCables()
+        self.params = self.part.params(team)
+        attitudes = np.tile(UPRIGHT, (n, 1)) if attitudes is None else attitudes
+        start = Start(np.zeros(3), np.zeros(3), directions, attitudes)
+        self.memory = self.part.initial(team, start)
+        self.state = self.memory[: state_size(n)]
+        drones = self.state[6:].reshape(n, 13)
+        if spin is not None:
+            drones[:, 3:6] = spin
+        if body_rates is not None:
+            drones[:, 10:13] = body_rates
+        self.thrusts, self.torques = np.zeros(n), np.zeros((n, 3))
+        self.external = np.zeros((n + 1, 3))
+        self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
+
+    def step(self, dt=0.001, count=1):
+        for _ in range(count):
+            RigidCables.kernel(
+                self.thrusts, self.torques, self.external, dt, self.params, self.memory,
+                self.tensions, self.slack_times,
+            )  # fmt: skip
+        return self
+
+    def observe(self):
+        n = self.n
+        out = [np.zeros((2, 3)), *(np.zeros((n, k)) for k in (3, 3, 4, 3, 3, 3))]
+        RigidCables.observe(self.params, self.memory, *out)
+        names = (
+            "load",
+            "positions",
+            "velocities",
+            "attitudes",
+            "rates",
+            "directions",
+            "direction_rates",
+        )
+        return dict(zip(names, out, strict=True))
+
+    def energy(self):
+        """Translational and potential energy, J; the attitudes' is separate."""
+        s, team = self.observe(), self.team
+        load = 0.5 * team.load_mass * s["load"][1] @ s["load"][1]
+        drones = 0.5 * team.masses @ np.sum(s["velocities"] ** 2, axis=1)
+        height = team.load_mass * s["load"][0, 2] + team.masses @ s["positions"][:, 2]
+        return load + drones + team.gravity * height
+
+    def momentum(self):
+        s, team = self.observe(), self.team
+        return team.load_mass * s["load"][1] + team.masses @ s["velocities"]
+
+    def angular_momentum(self):
+        """Of all bodies as points, about the world's origin."""
+        s, team = self.observe(), self.team
+        drones = np.cross(s["positions"], team.masses[:, None] * s["velocities"]).sum(axis=0)
+        return drones + team.load_mass * np.cross(s["load"][0], s["load"][1])
+
+    def spin_momentum(self):
+        """J Omega of each drone, turned into the world frame."""
+        s = self.observe()
+        body = self.team.inertias * s["rates"]
+        return np.array([rotation(q) @ h for q, h in zip(s["attitudes"], body, strict=True)])
+
+
+def random_rig(seed, n, *, gravity=9.81, spin=2.0):
+    rng = np.random.default_rng(seed)
+    first = rng.uniform(0.01, 0.05, (n, 3))
+    inertias = np.stack([first[:, 0], first[:, 1], 0.7 * (first[:, 0] + first[:, 1])], axis=1)
+    team = Team(
+        load_mass=rng.uniform(0.05, 3.0),
+        masses=rng.uniform(0.1, 2.0, n),
+        inertias=inertias,
+        cable_lengths=rng.uniform(0.2, 3.0, n),
+        gravity=gravity,
+    )
+    directions = rng.normal(size=(n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    omega = rng.normal(size=(n, 3)) * spin
+    omega -= np.sum(omega * directions, axis=1, keepdims=True) * directions
+    attitudes = rng.normal(size=(n, 4))
+    attitudes /= np.linalg.norm(attitudes, axis=1, keepdims=True)
+    rig = Rig(team, directions, spin=omega, attitudes=attitudes, body_rates=rng.normal(size=(n, 3)))
+    rig.state[:6] = rng.normal(size=6)
+    return rig, rng
+
+
+# ---------------------------------------------------------------- oracle
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 6, 7, 8])
+def test_accelerations_and_tensions_agree_with_maximal_coordinates(n):
+    for seed in range(13):
+        rig, rng = random_rig(100 * n + seed, n)
+        team = rig.team
+        rig.thrusts[:] = rng.uniform(0.0, 20.0, n)
+        rig.torques[:] = rng.normal(size=(n, 3))
+        rig.external[:] = rng.normal(size=(n + 1, 3))
+        s = rig.observe()
+        wanted, tensions = oracle(
+            team, s["directions"], s["direction_rates"], s["attitudes"], rig.thrusts, rig.external
+        )
+        slope, T = np.zeros_like(rig.state), np.zeros(n)
+        derivative(
+            n, rig.state, rig.thrusts, rig.torques, rig.external, rig.params, T,
+            np.zeros(4 * n), slope,
+        )  # fmt: skip
+        scale = max(1.0, np.abs(wanted).max())
+        np.testing.assert_allclose(slope[3:6], wanted[n], rtol=0, atol=1e-10 * scale)
+        np.testing.assert_allclose(
+            T, tensions, rtol=0, atol=1e-10 * max(1.0, np.abs(tensions).max())
+        )
+        drones, rates = rig.state[6:].reshape(n, 13), slope[6:].reshape(n, 13)
+        omega, alpha = drones[:, 3:6], drones[:, 0:3]
+        turning = np.cross(rates[:, 3:6], alpha) + np.cross(omega, np.cross(omega, alpha))
+        np.testing.assert_allclose(
+            slope[3:6] - team.cable_lengths[:, None] * turning,
+            wanted[:n],
+            rtol=0,
+            atol=1e-10 * scale,
+        )
+        spin = drones[:, 10:13]
+        torque_balance = team.inertias * rates[:, 10:13] + np.cross(spin, team.inertias * spin)
+        np.testing.assert_allclose(torque_balance, rig.torques, rtol=0, atol=1e-12)
+
+
+def test_recorded_tensions_belong_to_the_state_of_their_row():
+    """Every row of a manoeuvring flight satisfies the equations of motion by itself."""
+    flown = colift.run("figure-eight", timing__duration=2.0, timing__recording=0.05, seed=0)
+    r = flown.recording
+    team = flown.mission.team
+    assert len(r.time) == 41
+    for k in range(len(r.time)):
+        _, tensions = oracle(
+            team, r["directions"][k], r["direction_rates"][k], r["attitudes"][k], r["thrusts"][k],
+            r["external_forces"][k],
+        )  # fmt: skip
+        np.testing.assert_allclose(r["tensions"][k], tensions, rtol=0, atol=1e-9)
+    assert np.ptp(r["tensions"]) > 0.05  # the flight does manoeuvre
+
+
+# ---------------------------------------------------------------- closed forms
+
+
+def test_free_fall_leaves_the_cables_without_tension():
+    rig = Rig(Team.uniform(4), ring(4, 0.6))
+    rig.step(count=1000)
+    assert np.abs(rig.tensions).max() < 1e-12
+    np.testing.assert_allclose(rig.state[2], -0.5 * 9.81, rtol=1e-10)
+    np.testing.assert_allclose(rig.state[5], -9.81, rtol=1e-12)
+
+
+@pytest.mark.parametrize("cone_deg", [10.0, 35.0, 70.0])
+@pytest.mark.parametrize("n", [2, 3, 4, 7])
+def test_hover_tensions(n, cone_deg):
+    """T = m_L g / (n cos cone), held by thrusts of m g e3 - T alpha."""
+    cone = np.radians(cone_deg)
+    team = Team.uniform(n)
+    directions = ring(n, cone)
+    T = team.load_mass * team.gravity / (n * np.cos(cone))
+    thrust = -T * directions + team.masses[:, None] * team.gravity * E3
+    sizes = np.linalg.norm(thrust, axis=1)
+    axes = thrust / sizes[:, None]
+    half = np.arccos(axes[:, 2]) / 2.0
+    turn = np.cross(E3, axes)
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    attitudes = np.column_stack([np.cos(half), np.sin(half)[:, None] * turn])
+    rig = Rig(team, directions, attitudes=attitudes)
+    rig.thrusts[:] = sizes
+    rig.step()
+    np.testing.assert_allclose(rig.tensions, T, rtol=1e-12)
+    rig.step(count=200)
+    np.testing.assert_allclose(rig.observe()["load"], 0.0, atol=1e-10)
+
+
+def test_two_bodies_on_a_cable_in_free_fall_rotate_uniformly():
+    """Relative angular rate constant, T = m_red L omega^2, whatever gravity does."""
+    team = Team.uniform(1, load_mass=0.3, mass=0.7, cable_length=1.4)
+    rate = 3.0
+    rig = Rig(team, np.array([[1.0, 0.0, 0.0]]), spin=np.array([[0.0, rate, 0.0]]))
+    reduced = 0.3 * 0.7 / (0.3 + 0.7)
+    for _ in range(10):
+        rig.step(count=100)
+        np.testing.assert_allclose(rig.tensions, reduced * 1.4 * rate**2, rtol=1e-9)
+        np.testing.assert_allclose(rig.state[9:12], [0.0, rate, 0.0], rtol=0, atol=1e-9)
+    # After 1 s the direction has turned by `rate` radians about y: x goes to -z.
+    np.testing.assert_allclose(rig.state[6:9], [np.cos(rate), 0.0, -np.sin(rate)], atol=1e-9)
+
+
+@pytest.mark.parametrize(("length", "gravity", "amplitude"), [(1.0, 9.81, 0.2), (2.5, 1.62, 0.4)])
+def test_pendulum_period(length, gravity, amplitude):
+    """A drone of enormous mass in exact hover: the load swings as a pendulum on a fixed point."""
+    mass = 1e6
+    team = Team.uniform(1, load_mass=0.2, mass=mass, cable_length=length, gravity=gravity)
+    rig = Rig(team, np.array([[np.sin(amplitude), 0.0, -np.cos(amplitude)]]))
+    rig.thrusts[:] = mass * gravity
+    series = 1.0 + amplitude**2 / 16.0 + 11.0 * amplitude**4 / 3072.0
+    period = 2.0 * np.pi * np.sqrt(length / gravity) * series
+    crossings, before, time = [], amplitude, 0.0
+    while len(crossings) < 3:
+        rig.step()
+        time += 0.001
+        angle = np.arctan2(rig.state[6], -rig.state[8])
+        if before * angle < 0.0:
+            crossings.append(time - 0.001 * angle / (angle - before))
+        before = angle
+    assert crossings[0] == pytest.approx(period / 4.0, rel=2e-5)
+    assert crossings[2] - crossings[0] == pytest.approx(period, rel=2e-5)
+
+
+def test_positive_thrust_pushes_along_body_z_up():
+    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]))
+    rig.thrusts[:] = 20.0
+    rig.step(count=100)
+    total = 0.5 + 0.225
+    assert rig.state[5] == pytest.approx(0.1 * (20.0 / total - 9.81), rel=1e-9)
+    assert rig.tensions[0] == pytest.approx(0.225 * 20.0 / total, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axis", "thrust_goes_to"), [(0, [0.0, -1.0]), (1, [1.0, 0.0]), (2, [0.0, 0.0])]
+)
+def test_torque_turns_the_body_the_right_way(axis, thrust_goes_to):
+    """Positive torque about x speeds Omega_x up and tilts the thrust to -y; about y, to +x."""
+    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]))
+    rig.torques[0, axis] = 0.01
+    rig.step(count=100)
+    s = rig.observe()
+    expected = np.zeros(3)
+    expected[axis] = 0.1 * 0.01 / rig.team.inertias[0, axis]
+    np.testing.assert_allclose(s["rates"][0], expected, atol=1e-12)
+    tilt = 0.5 * 0.1 * expected[axis]
+    thrust = rotation(s["attitudes"][0]) @ E3
+    np.testing.assert_allclose(thrust[:2], tilt * np.array(thrust_goes_to), atol=1e-5)
+    # Under thrust the drone goes where its axis points.
+    rig.torques[:] = 0.0
+    rig.thrusts[:] = 8.0
+    rig.step(count=300)
+    moved = rig.observe()["velocities"][0, :2]
+    assert np.sign(np.round(moved, 6)).tolist() == np.sign(thrust_goes_to).tolist()
+
+
+def test_external_forces_act_on_drones_and_last_row_on_the_load():
+    team = Team.uniform(2, gravity=0.0)
+    rig = Rig(team, np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]))
+    rig.external[2] = [0.3, 0.0, 0.0]
+    rig.external[0] = [0.0, 0.2, 0.0]
+    rig.step(count=10)
+    np.testing.assert_allclose(rig.momentum(), [0.003, 0.002, 0.0], atol=1e-12)
+    assert rig.state[3] > 0.0
+    assert rig.observe()["velocities"][0, 1] > rig.observe()["velocities"][1, 1]
+
+
+# ---------------------------------------------------------------- invariants
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 8])
+def test_energy_and_momentum_are_conserved_without_thrust(n):
+    rig, _ = random_rig(n, n, gravity=9.81, spin=1.5)
+    energy, momentum = rig.energy(), rig.momentum()
+    kinetic = 0.5 * rig.team.masses @ np.sum(rig.observe()["velocities"] ** 2, axis=1)
+    fallen = 0.0
+    for _ in range(10):
+        rig.step(count=1000)
+        fallen += 1.0
+        assert abs(rig.energy() - energy) < 1e-6 * kinetic + 1e-9 * 9.81**2 * fallen**2
+        weight = rig.team.load_mass + rig.team.masses.sum()
+        np.testing.assert_allclose(
+            rig.momentum(), momentum - weight * 9.81 * fallen * E3, rtol=0, atol=1e-5
+        )
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 8])
+def test_angular_momentum_is_conserved_without_gravity(n):
+    rig, _ = random_rig(10 + n, n, gravity=0.0, spin=3.0)
+    before, momentum = rig.angular_momentum(), rig.momentum()
+    rig.step(count=5000)
+    np.testing.assert_allclose(
+        rig.angular_momentum(), before, rtol=0, atol=1e-7 * np.abs(before).max()
+    )
+    np.testing.assert_allclose(rig.momentum(), momentum, rtol=0, atol=1e-7)
+    assert abs(rig.angular_momentum()).max() > 0.1
+
+
+def test_constraints_do_not_drift():
+    rig, rng = random_rig(5, 6, spin=4.0)
+    rig.thrusts[:] = rng.uniform(0.0, 10.0, 6)
+    rig.torques[:] = 0.01 * rng.normal(size=(6, 3))
+    for _ in range(20):
+        rig.step(count=250)
+        drones = rig.state[6:].reshape(6, 13)
+        alpha, omega, q = drones[:, 0:3], drones[:, 3:6], drones[:, 6:10]
+        assert np.abs(np.linalg.norm(alpha, axis=1) - 1.0).max() <= 1e-12
+        assert np.abs(np.linalg.norm(q, axis=1) - 1.0).max() <= 1e-12
+        assert np.abs(np.sum(alpha * omega, axis=1)).max() <= 1e-12 * max(1.0, np.abs(omega).max())
+        s = rig.observe()
+        spans = np.linalg.norm(s["load"][0] - s["positions"], axis=1)
+        np.testing.assert_allclose(spans, rig.team.cable_lengths, rtol=1e-12)
+
+
+def test_gyroscopic_torque_does_no_work():
+    """Torque-free tri-axial bodies: rotational energy, |J Omega| and J Omega in the world stay."""
+    rig, _ = random_rig(3, 5, gravity=0.0, spin=0.0)
+    rig.state[6:].reshape(5, 13)[:, 10:13] *= 6.0
+    inertias = rig.team.inertias
+
+    def energy():
+        return 0.5 * np.sum(inertias * rig.observe()["rates"] ** 2, axis=1)
+
+    energies, momenta, rates = energy(), rig.spin_momentum(), rig.observe()["rates"]
+    for _ in range(5):
+        rig.step(count=1000)
+        np.testing.assert_allclose(energy(), energies, rtol=1e-7)
+        np.testing.assert_allclose(
+            rig.spin_momentum(), momenta, rtol=0, atol=1e-6 * np.linalg.norm(momenta, axis=1).max()
+        )
+    assert np.abs(rig.observe()["rates"] - rates).max() > 1.0  # and yet the bodies tumble
+
+
+def test_rotation_about_a_principal_axis_is_uniform():
+    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]), body_rates=[[0.0, 0.0, 2.0]])
+    rig.step(count=500)
+    np.testing.assert_allclose(
+        rig.observe()["attitudes"][0], [np.cos(0.5), 0.0, 0.0, np.sin(0.5)], atol=1e-10
+    )
+
+
+def test_integrator_is_of_fourth_order():
+    """Richardson: halving the step divides the change of the answer by 2^4, projection included."""
+
+    def flown(dt):
+        rig, rng = random_rig(21, 3, spin=1.0)
+        rig.thrusts[:] = rng.uniform(2.0, 8.0, 3)
+        rig.torques[:] = 0.02 * rng.normal(size=(3, 3))
+        return rig.step(dt, round(0.4 / dt)).state.copy()
+
+    answers = [flown(0.4 / count) for count in (40, 80, 160, 320)]
+    changes = [np.linalg.norm(b - a) for a, b in pairwise(answers)]
+    orders = np.log2(np.array(changes[:-1]) / changes[1:])
+    assert np.all(np.abs(orders - 4.0) < 0.25), orders
+
+
+def test_slack_time_counts_negative_tension():
+    """Thrust down on a drone above the load pushes through the rod."""
+    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]))
+    rig.thrusts[:] = -1.0
+    rig.step(count=50)
+    assert rig.tensions[0] < 0.0
+    assert rig.slack_times[0] == pytest.approx(0.05)
+    rig.thrusts[:] = 1.0
+    rig.step(count=50)
+    assert rig.tensions[0] > 0.0
+    assert rig.slack_times[0] == pytest.approx(0.05)
+
+
+def test_sixty_four_drones():
+    rig, rng = random_rig(64, 64, spin=0.5)
+    rig.thrusts[:] = rng.uniform(0.0, 10.0, 64)
+    rig.step(count=200)
+    assert np.isfinite(rig.state).all()
+    flown = colift.run("hover", drones__count=64, load__mass=4.0, timing__duration=0.2)
+    assert flown.recording.outcome == "completed"
+    assert all(np.isfinite(a).all() for a in flown.recording.arrays.values() if a.ndim > 1)

@@ -1,0 +1,158 @@
+"""Every metric on a synthetic recording whose answer is known, and the paper's numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import colift
+from colift import metrics
+from colift.geometry import ring
+from colift.mission import load_mission
+from colift.recording import Recording
+from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
+
+
+def synthetic(n=4, duration=20.0, period=0.01):
+    """A flight of known numbers: error 3 cm and 4 cm in turn, total tension 1 + t N."""
+    time = np.arange(round(duration / period) + 1) * period
+    rows = len(time)
+    arrays = {s.name: np.zeros((rows, *s.shape_for(n))) for s in SIGNALS}
+    arrays["load"][::2, 0, 0] = 0.03
+    arrays["load"][1::2, 0, 2] = -0.04
+    arrays["reference"][:, 0] = arrays["load"][:, 0] * 0.0 + [1.0, 2.0, 3.0]
+    arrays["load"][:, 0] += [1.0, 2.0, 3.0]
+    share = np.arange(1.0, n + 1.0)
+    share /= share.sum()
+    arrays["tensions"][:] = (1.0 + time)[:, None] * share
+    arrays["desired_tensions"][:] = arrays["tensions"] - 0.25
+    arrays["directions"][:] = ring(n, np.radians(40.0))
+    arrays["directions"][rows // 2] = ring(n, np.radians(35.0))
+    arrays["desired_directions"][:] = ring(n, np.radians(30.0))
+    arrays["slack_times"][-1] = 0.5
+    cycles = {s.name: np.zeros(101) for s in CYCLE_SIGNALS}
+    cycles["allocator_status"][[3, 70]] = [1.0, 4.0]
+    cycles["allocator_iterations"][:] = 2.0
+    cycles["allocator_iterations"][5] = 12.0
+    cycles["allocator_time"][:] = np.arange(101) * 1e-6
+    mission = load_mission("hover", {"drones.count": n, "timing.duration": duration})
+    cycle_time = np.arange(101) * 0.01
+    return Recording(mission=mission, time=time, cycle_time=cycle_time, arrays={**arrays, **cycles})
+
+
+def neighbour_angle(cone_deg, n=4):
+    """Smallest angle of a ring, by the chord."""
+    return math.degrees(2.0 * math.asin(math.sin(math.radians(cone_deg)) * math.sin(math.pi / n)))
+
+
+EXPECTED = {
+    "tracking_rms_m": math.sqrt((1001 * 0.03**2 + 1000 * 0.04**2) / 2001),
+    "tracking_max_m": 0.04,
+    "min_angle_deg": neighbour_angle(35.0),
+    "min_desired_angle_deg": neighbour_angle(30.0),
+    "peak_total_tension_N": 21.0,
+    "mean_total_tension_N": 11.0,
+    "peak_tension_N": 21.0 * 0.4,
+    "tension_integral_10s_Ns": 10.0 + 50.0,
+    "tension_integral_Ns": 20.0 + 200.0,
+    "tension_tracking_rms_N": 0.25,
+    "tension_imbalance": 4.0,
+    "slack_time_s": 2.0,
+    "allocator_failures": 2.0,
+    "allocator_mean_iterations": 2.0 + 10.0 / 101.0,
+    "allocator_max_iterations": 12.0,
+    "allocator_mean_us": 50.0,
+    "allocator_median_us": 50.0,
+    "allocator_p99_us": 99.0,
+    "allocator_max_us": 100.0,
+}
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_metric_of_the_synthetic_flight(name):
+    assert metrics.compute(synthetic())[name] == pytest.approx(EXPECTED[name], rel=1e-9)
+
+
+def test_every_metric_has_a_known_answer_a_unit_and_a_meaning():
+    found = {metric.name: metric for metric in metrics.all_metrics()}
+    assert set(found) == set(EXPECTED)
+    for name, metric in found.items():
+        assert metric.meaning
+        suffix = metric.unit.replace(" ", "")
+        assert metric.unit == "1" or name.endswith(f"_{suffix}")
+
+
+def test_angles_do_not_apply_to_one_cable():
+    values = metrics.compute(synthetic(n=1))
+    assert math.isnan(values["min_angle_deg"])
+    assert math.isnan(values["min_desired_angle_deg"])
+    assert values["tracking_max_m"] == pytest.approx(0.04)
+
+
+def test_the_papers_integral_needs_ten_seconds():
+    assert math.isnan(metrics.compute(synthetic(duration=9.0))["tension_integral_10s_Ns"])
+    exactly = metrics.compute(synthetic(duration=10.0))
+    assert exactly["tension_integral_10s_Ns"] == pytest.approx(60.0)
+    assert exactly["tension_integral_Ns"] == pytest.approx(60.0)
+    run = colift.run("hover", timing__duration=0.5)
+    assert math.isnan(run.metrics["tension_integral_10s_Ns"])
+    assert run.metrics["tension_integral_Ns"] > 0.5
+
+
+def test_many_drones_are_compared_in_slices_without_a_difference():
+    directions = np.random.default_rng(0).normal(size=(50, 400, 3))
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    cosines = np.einsum("tik,tjk->tij", directions, directions)
+    cosines[:, np.arange(400), np.arange(400)] = -1.0
+    expected = np.degrees(np.arccos(cosines.max()))
+    assert metrics._smallest_angle(directions) == pytest.approx(expected, abs=1e-5)
+
+
+def test_a_cable_without_tension_is_an_infinite_imbalance():
+    recording = synthetic()
+    recording.arrays["tensions"][:, 0] = 0.0
+    assert metrics.compute(recording)["tension_imbalance"] == math.inf
+
+
+# ---------------------------------------------------------------- the paper's numbers
+
+
+@pytest.fixture(scope="module")
+def spirals():
+    return {
+        mu: colift.run("paper-spiral", allocator="sqp", mu=mu, seed=0) for mu in (0.15, 0.75, 1.35)
+    }
+
+
+@pytest.mark.parametrize("mu", [0.15, 0.75, 1.35])
+def test_paper_spiral_flies_without_failure(spirals, mu):
+    run = spirals[mu]
+    assert run.compiled
+    assert run.recording.outcome == "completed"
+    assert run.recording.time[-1] == pytest.approx(20.0)
+    assert run.metrics["allocator_failures"] == 0
+    assert run.metrics["slack_time_s"] == 0.0
+
+
+def test_paper_spiral_tracks_within_half_a_millimetre(spirals):
+    """Erratum: with the feed-forward as described, 2.97 cm RMS does not come out."""
+    assert spirals[0.15].metrics["tracking_rms_m"] <= 5e-4
+    assert spirals[0.15].metrics["tracking_max_m"] <= 2e-3
+
+
+@pytest.mark.parametrize(("mu", "paper"), [(0.15, 26.8), (0.75, 32.1), (1.35, 33.7)])
+def test_paper_tension_integral_is_over_ten_seconds(spirals, mu, paper):
+    """Erratum: J_T as printed belongs to 10 s of the 20 s mission."""
+    assert spirals[mu].metrics["tension_integral_10s_Ns"] == pytest.approx(paper, rel=0.02)
+    assert spirals[mu].metrics["tension_integral_Ns"] > 1.9 * paper
+
+
+@pytest.mark.parametrize(("mu", "paper"), [(0.75, 47.8), (1.35, 47.9)])
+def test_paper_minimum_angles_are_those_of_the_initial_formation(spirals, mu, paper):
+    run = spirals[mu]
+    assert run.metrics["min_angle_deg"] == pytest.approx(paper, abs=0.3)
+    first = metrics._smallest_angle(run.recording["directions"][:1])
+    assert first == pytest.approx(run.metrics["min_angle_deg"], abs=0.3)
+    assert metrics._smallest_angle(run.recording["directions"][-1:]) > 58.0

@@ -1,0 +1,160 @@
+"""The `colift` command as a user meets it: output, files, exit codes, interruption."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from colift.recording import Recording
+
+SHORT = ("--set", "timing.duration=1.0", "--no-report")
+
+
+def colift(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "colift", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_run_as_json_prints_one_object_and_nothing_else(tmp_path: Path) -> None:
+    done = colift("run", "--json", "--out", str(tmp_path / "flight"))
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["outcome"] == "completed"
+    assert result["metrics"]["tracking_rms_m"] <= 5e-4
+    for path in result["files"].values():
+        assert Path(path).stat().st_size > 0
+    assert json.loads((tmp_path / "flight/metrics.json").read_text()) == result["metrics"]
+    assert Recording.load(tmp_path / "flight/recording.h5").mission.name == "paper-spiral"
+
+
+def test_the_resolved_mission_flies_again_with_the_same_signals(tmp_path: Path) -> None:
+    assert colift("run", "hover", *SHORT, "--out", str(tmp_path / "a")).returncode == 0
+    again = colift(
+        "run", str(tmp_path / "a/mission.toml"), "--no-report", "--out", str(tmp_path / "b")
+    )
+    assert again.returncode == 0, again.stderr
+    first, second = (Recording.load(tmp_path / x / "recording.h5") for x in "ab")
+    for name in first:
+        if name != "allocator_time":
+            assert (first[name] == second[name]).all(), name
+
+
+def test_results_go_to_a_dated_folder_by_default(tmp_path: Path) -> None:
+    assert colift("run", "hover", *SHORT, folder=tmp_path).returncode == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert folder.name.startswith("hover-2")
+    assert tomllib.loads((folder / "mission.toml").read_text())["timing"]["duration"] == 1.0
+
+
+def test_set_changes_any_field_and_the_table_shows_units(tmp_path: Path) -> None:
+    done = colift("run", *SHORT, "--set", "allocation.mu=0.75", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert "tracking_rms_m" in done.stdout
+    assert tomllib.loads((tmp_path / "mission.toml").read_text())["allocation"]["mu"] == 0.75
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("run", "paper-spirl"), "did you mean 'paper-spiral'"),
+        (("run", "--set", "load.mass=-1"), "load.mass: must be greater than 0"),
+        (("run", "--set", "load.mas=1"), "did you mean 'mass'"),
+        (("run", "--set", "mu"), "key=value"),
+        (("run", "nowhere.toml"), "cannot be read"),
+        (("run", "--nonsense"), "No such option"),
+        (("run", "--with", "nowhere.py"), "not a Python file"),
+        (("bench", "--sizes", "4,x"), "not a list of whole numbers"),
+        (("bench", "--sizes", "0"), "between 1 and 1024"),
+        (("fly-away",), "No such command"),
+    ],
+)
+def test_a_mistake_is_named_and_nothing_is_written(
+    tmp_path: Path, arguments: tuple[str, ...], says: str
+) -> None:
+    done = colift(*arguments, folder=tmp_path)
+    assert done.returncode in (1, 2)
+    assert says in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_diverged_flight_says_so_and_keeps_its_recording(tmp_path: Path) -> None:
+    changes = (
+        "--set",
+        "attitude_control.k_d=[900.0, 900.0, 900.0]",
+        "--set",
+        "timing.attitude_control=0.01",
+    )
+    done = colift("run", *changes, "--no-report", "--json", "--out", str(tmp_path))
+    assert done.returncode == 3
+    assert json.loads(done.stdout)["outcome"].startswith("diverged before t =")
+    assert (tmp_path / "recording.h5").stat().st_size > 0
+
+
+def test_ctrl_c_ends_quietly_and_leaves_no_half_written_file(tmp_path: Path) -> None:
+    long = (
+        "--set",
+        "timing.duration=100000.0",
+        "--set",
+        "timing.recording=1.0",
+        "--set",
+        "timing.allocation=0.1",
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-m", "colift", "run", *long, "--out", str(tmp_path / "flight")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(6.0)
+    assert process.poll() is None, "finished before it could be interrupted"
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert not (tmp_path / "flight").exists()
+
+
+def test_list_names_missions_and_parts() -> None:
+    listing = json.loads(colift("list", "--json").stdout)
+    assert "paper-spiral" in listing["missions"]
+    assert {"sqp", "ring", "lopsided"} <= set(listing["parts"]["allocation"])
+
+
+def test_help_teaches() -> None:
+    for command in ((), ("run",), ("reproduce",), ("list",), ("bench",)):
+        done = colift(*command, "--help")
+        assert done.returncode == 0
+        assert "Usage" in done.stdout
+
+
+def test_an_allocator_in_a_file_of_ones_own_flies(tmp_path: Path) -> None:
+    (tmp_path / "halves.py").write_text(
+        "from colift.allocation.base import AllocatorPart\n"
+        "def share(force, acceleration, dt, params, memory, tensions, directions, info):\n"
+        "    tensions[:] = abs(force[2]) / len(tensions)\n"
+        "    directions[:] = (0.0, 0.0, -1.0)\n"
+        "    return 0\n"
+        "class Halves(AllocatorPart):\n"
+        "    kernel = share\n"
+    )
+    done = colift(
+        "run", "hover", "--with", "halves.py", "--set", "allocation.kind=halves", "--set",
+        "timing.duration=0.1", "--no-report", "--json", folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["compiled"] is False

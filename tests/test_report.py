@@ -1,0 +1,193 @@
+"""Figures and pages: everything draws, nothing leaks, equal recordings give equal bytes."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import colift
+from colift import metrics
+from colift.mission.load import load_mission, mission_names
+from colift.recording import Recording
+from colift.report import comparison, figures, html, panels, render, style
+
+
+def fly(mission: str = "paper-spiral", **settings: object) -> Recording:
+    """Two seconds of a mission at the coarse recording rate that figures need."""
+    events = {"events": []} if mission == "payload-step" else {}
+    overrides = {"timing.duration": 2.0, **events, **settings}
+    return colift.run(mission, overrides=overrides).recording
+
+
+def spoil(recording: Recording, value: float, start: float = 1.0) -> Recording:
+    """The same flight as if it had diverged at ``start``, s."""
+    late = recording.time >= start
+    arrays = {name: values.copy() for name, values in recording.arrays.items()}
+    for name in ("load", "tensions", "directions", "positions", "desired_tensions"):
+        arrays[name][late] = value
+    return replace(recording, arrays=arrays, outcome=f"diverged before t = {start:g} s")
+
+
+@pytest.fixture(scope="module")
+def spiral() -> Recording:
+    return fly()
+
+
+@pytest.fixture(scope="module")
+def written(spiral: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    html.write_report(spiral, folder, metrics=metrics.compute(spiral))
+    return folder
+
+
+@pytest.mark.parametrize("mission", mission_names())
+def test_every_figure_of_every_shipped_mission_draws(mission: str) -> None:
+    recording = fly(mission)
+    for name, entry in figures.FIGURES.items():
+        assert len(render.png(entry.draw(recording))) > 8_000, name
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 12, 64])
+def test_any_number_of_drones_draws(n: int) -> None:
+    recording = fly(**{"drones.count": n, "timing.duration": 0.2})
+    for name, entry in figures.FIGURES.items():
+        assert len(render.svg(entry.draw(recording), name, "")) > 8_000, name
+    assert f"<li>{n} drone" in html.report(recording, metrics.compute(recording), [])
+
+
+@pytest.mark.parametrize("value", [np.nan, -1e300])
+def test_a_diverged_flight_is_drawn_up_to_where_it_broke(
+    spiral: Recording, value: float, tmp_path: Path
+) -> None:
+    broken = spoil(spiral, value)
+    assert panels.intact(broken).time[-1] == pytest.approx(1.0 - 0.005)
+    with np.errstate(all="ignore"):
+        numbers = metrics.compute(broken)
+    page = html.write_report(broken, tmp_path, metrics=numbers).read_text()
+    assert 'class="banner bad"' in page
+    assert "Diverged before t = 1 s" in page
+
+
+def test_a_flight_that_breaks_at_once_still_draws(spiral: Recording) -> None:
+    broken = spoil(spiral, np.nan, start=0.0)
+    for entry in figures.FIGURES.values():
+        render.png(entry.draw(broken))
+
+
+def test_comparisons_draw(spiral: Recording) -> None:
+    flights = {"<baseline> $a": spiral, "SQP": spiral, "broken": spoil(spiral, 1e12)}
+    for drawing in render.draw(comparison.COMPARISONS, flights):
+        assert drawing.svg.rstrip().endswith("</svg>")
+        assert "&lt;baseline&gt; $a" in drawing.svg
+
+
+def test_files_are_written(written: Path) -> None:
+    assert (written / "report.html").stat().st_size > 50_000
+    for name in figures.FIGURES:
+        svg = (written / "figures" / f"{name}.svg").read_text()
+        assert "<svg" in svg
+        assert svg.rstrip().endswith("</svg>")
+        assert 8_000 < len(svg) < render.LARGEST_SVG
+        assert (written / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert not list(written.rglob(".*"))
+
+
+def test_page_requests_nothing(written: Path) -> None:
+    page = (written / "report.html").read_text()
+    addresses = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
+    assert "//" not in re.sub(r"data:[^\"]*", "", addresses)
+    assert "<script" not in page
+    assert "<link" not in page
+    assert "@import" not in page
+
+
+def test_ids_are_unique_and_every_reference_resolves(written: Path) -> None:
+    page = (written / "report.html").read_text()
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids)) > 100
+    wanted = re.findall(r'href="#([^"]+)"', page) + re.findall(r"url\(#([^)]+)\)", page)
+    assert set(wanted) <= set(ids)
+
+
+def test_equal_recordings_give_equal_bytes(
+    spiral: Recording, written: Path, tmp_path: Path
+) -> None:
+    html.write_report(spiral, tmp_path, metrics=metrics.compute(spiral))
+    for path in written.rglob("*.*"):
+        assert path.read_bytes() == (tmp_path / path.relative_to(written)).read_bytes(), path.name
+
+
+def test_recording_read_from_a_file_gives_the_same_page(spiral: Recording, tmp_path: Path) -> None:
+    def page(recording: Recording) -> str:
+        some = {"angles": figures.FIGURES["angles"]}
+        return html.report(recording, metrics.compute(recording), render.draw(some, recording))
+
+    assert page(Recording.load(spiral.save(tmp_path / "flight.h5"))) == page(spiral)
+
+
+def test_text_of_a_mission_is_escaped() -> None:
+    evil = '<script>alert("1")</script>'
+    recording = fly(name=evil, description=evil + "&", **{"timing.duration": 0.1})
+    page = html.report(recording, metrics.compute(recording), [])
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_mission_in_the_page_is_a_valid_mission_file() -> None:
+    mission = load_mission("payload-step", {"name": 'quotes " and \\ and é', "seed": 3})
+    assert tomllib.loads(html.toml(mission.resolved())) == mission.resolved()
+
+
+def test_large_svg_is_shown_as_bitmap(spiral: Recording) -> None:
+    entry = figures.FIGURES["tensions"]
+    drawing = render.draw({"tensions": entry}, spiral)[0]
+    huge = replace(drawing, svg=drawing.svg + " " * render.LARGEST_SVG)
+    assert drawing.inline().startswith("<svg")
+    assert huge.inline().startswith('<img src="data:image/png;base64,')
+
+
+def test_verdict_names_what_is_wrong(spiral: Recording) -> None:
+    good = metrics.compute(spiral)
+    assert html.verdict(spiral, good)[0] == "good"
+    level, words = html.verdict(spiral, {**good, "slack_time_s": 0.5, "min_angle_deg": 12.0})
+    assert level == "warn"
+    assert "slack cables for 0.5 s" in words
+    assert "smallest angle 12.0 deg, below 30 deg" in words
+
+
+def test_decimation_keeps_extremes_ends_and_gaps() -> None:
+    x = np.linspace(0.0, 1.0, 20_001)
+    y = np.sin(40.0 * x)
+    y[777], y[15_333] = 9.0, -7.0
+    y[5_000:6_000] = np.nan
+    dx, dy = panels.decimate(x, y, 1000)
+    assert len(dx) <= 1000
+    assert np.nanmax(dy) == 9.0
+    assert np.nanmin(dy) == -7.0
+    assert (dx[0], dx[-1]) == (x[0], x[-1])
+    assert np.all(np.diff(dx) > 0)
+    assert np.isnan(dy[(dx > 0.26) & (dx < 0.29)]).all()
+
+
+def test_smallest_angle_is_that_of_the_metrics() -> None:
+    recording = fly(**{"drones.count": 7, "timing.duration": 0.5})
+    _, angle = panels.smallest_angle(recording)
+    assert angle.min() == pytest.approx(metrics.compute(recording)["min_angle_deg"], abs=1e-6)
+
+
+def test_every_drone_has_its_own_look() -> None:
+    looks = {str(style.drone(i)) for i in range(64)}
+    assert len(looks) == 64
+
+
+def test_drawing_leaves_global_settings_alone(spiral: Recording) -> None:
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    render.draw({"tensions": figures.FIGURES["tensions"]}, spiral)
+    assert dict(mpl.rcParams) == before
