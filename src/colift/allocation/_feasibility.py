@@ -48,6 +48,7 @@ class Feasibility:
         A formation in hover within all limits, drone to load (the least bad one after a conflict).
     tensions : (n,) array
         Its tensions, N.
+
     """
 
     ok: bool
@@ -146,6 +147,7 @@ def spread_formation(n: int, cone: float, min_angle: float) -> Array:
     ------
     ValueError
         If no such formation is found; names both limits and the widest angle that was found.
+
     """
     best, angle = widest_formation(n, cone, enough=min_angle)
     if angle < min_angle:
@@ -182,7 +184,7 @@ def widest_formation(n: int, cone: float, *, enough: float = math.inf) -> tuple[
         return ring(1, cone), math.pi
     single = ring(n, cone)
     angle = float(pairwise_angles(single).min())
-    if angle >= enough or n <= 5 and cone <= math.radians(60.0):
+    if angle >= enough or (n <= 5 and cone <= math.radians(60.0)):
         return single, angle
     best, angle = _search(n, cone, enough)
     return best.copy(), angle
@@ -193,7 +195,9 @@ def _starts(n: int, cone: float) -> Iterator[Array]:
     yield ring(n, cone)
     for inside in range(1, max(2, n // 2 + 1)):
         if inside < n:
-            inner = ring(inside, 0.45 * cone, heading=math.pi / inside) if inside > 1 else ring(1, 0.0)
+            inner = (
+                ring(inside, 0.45 * cone, heading=math.pi / inside) if inside > 1 else ring(1, 0.0)
+            )
             yield np.vstack([ring(n - inside, cone), inner])
     rng = np.random.default_rng(0)
     for _ in range(STARTS):

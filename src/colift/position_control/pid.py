@@ -112,7 +112,9 @@ class Pid(PositionControlPart):
     integral_limit: Annotated[float, Field(gt=0.0)] = 1.0
     """Bound on the integral of the error per axis, m s."""
     direction_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
-    """Time constant of the derivative of the wanted cable directions, s (unpublished; chosen)."""
+    """Time constant of the derivative of the wanted cable directions, s (unpublished; chosen).
+
+    Much below 0.2 s the loop from load error over direction to drone velocity is unstable."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=0.1)] = 0.003
     """Time constant of the derivative of the thrust direction, s (unpublished; chosen)."""
     direction_rates: bool = True
