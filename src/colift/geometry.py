@@ -41,7 +41,7 @@ def min_norm_tensions(directions: Array, force: ArrayLike) -> Array:
 def zero_yaw_quaternion(thrust_direction: Array) -> Array:
     """Attitude (..., 4), wxyz, that turns e3 into the unit ``thrust_direction`` (..., 3) without yaw.
 
-    Paper section 2.4; undefined for a direction straight down.
+    Paper section 2.3; undefined for a direction straight down.
     """
     root = np.sqrt(2.0 * thrust_direction[..., 2] + 2.0)
     return np.stack(

@@ -11,6 +11,7 @@ import importlib
 import importlib.metadata
 import importlib.util
 import pkgutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -80,6 +81,7 @@ def load_file(path: str | Path) -> list[type[Part]]:
     if spec is None or spec.loader is None or not path.is_file():
         raise ColiftError(f"{path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[module.__name__] = module  # by this name its kernels are found in the cache
     spec.loader.exec_module(module)
     parts = _parts_of(module, module.__name__)
     if not parts:

@@ -164,7 +164,7 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
 
 
 def _tracking(flights: dict[str, Run]) -> Iterator[Row]:
-    section = "Tracking (paper fig. 3)"
+    section = "Tracking (paper fig. 4)"
     m = flights["sqp-0.15"].metrics
     why = "the controller as described, started smoothly and in balance, tracks this closely"
     rms = m["tracking_rms_m"] * 100
@@ -188,7 +188,7 @@ def _tracking(flights: dict[str, Run]) -> Iterator[Row]:
 
 
 def _separation(flights: dict[str, Run]) -> Iterator[Row]:
-    section = "Cable separation (paper figs. 5 and 8b)"
+    section = "Cable separation (paper figs. 6 and 8b)"
     for mu in MUS:
         name = f"sqp-{mu}"
         ours, paper = flights[name].metrics["min_angle_deg"], MIN_ANGLE[mu]
@@ -235,7 +235,7 @@ def _separation(flights: dict[str, Run]) -> Iterator[Row]:
 
 
 def _tension(flights: dict[str, Run]) -> Iterator[Row]:
-    section = "Tension (paper figs. 4, 7 and 8a)"
+    section = "Tension (paper figs. 5, 7 and 8a)"
     for mu in MUS:
         name = f"sqp-{mu}"
         ours = flights[name].metrics["tension_integral_10s_Ns"]

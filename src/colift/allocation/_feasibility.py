@@ -170,7 +170,7 @@ def widest_angle(n: int, cone: float) -> float:
 def _search(n: int, cone: float, enough: float) -> tuple[Array, float]:
     best, angle = ring(n, cone), -1.0
     for start in _starts(n, cone):
-        found, reached = _spread(start, cone)
+        found, reached = _spread(start, cone, enough)
         if reached > angle:
             best, angle = found, reached
         if angle >= enough:
@@ -191,9 +191,11 @@ def widest_formation(n: int, cone: float, *, enough: float = math.inf) -> tuple[
 
 
 def _starts(n: int, cone: float) -> Iterator[Array]:
-    """Rings with none, one or several cables inside; then random ones, evenly over the cap."""
+    """A sunflower, rings with none, one or several cables inside, then random formations."""
+    turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(n)
+    yield _cap(np.linspace(0.0, 1.0, n), turn, cone)
     yield ring(n, cone)
-    for inside in range(1, max(2, n // 2 + 1)):
+    for inside in range(1, max(2, n // 2 + 1), max(1, n // 12)):
         if inside < n:
             inner = (
                 ring(inside, 0.45 * cone, heading=math.pi / inside) if inside > 1 else ring(1, 0.0)
@@ -201,13 +203,17 @@ def _starts(n: int, cone: float) -> Iterator[Array]:
             yield np.vstack([ring(n - inside, cone), inner])
     rng = np.random.default_rng(0)
     for _ in range(STARTS):
-        height = 1.0 - rng.random(n) * (1.0 - math.cos(cone))
-        azimuth = 2.0 * math.pi * rng.random(n)
-        radius = np.sqrt(1.0 - height**2)
-        yield -np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
+        yield _cap(rng.random(n), 2.0 * math.pi * rng.random(n), cone)
 
 
-def _spread(start: Array, cone: float) -> tuple[Array, float]:
+def _cap(share: NDArray[np.floating], azimuth: NDArray[np.floating], cone: float) -> Array:
+    """Directions by azimuth (rad) and by the share of the cap's area that lies further inside."""
+    height = 1.0 - share * (1.0 - math.cos(cone))
+    radius = np.sqrt(1.0 - height**2)
+    return -np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
+
+
+def _spread(start: Array, cone: float, enough: float) -> tuple[Array, float]:
     """Repulsion with a power law that hardens, inside the cone; the best formation on the way."""
     x = _clip(start + 1e-4 * np.cos(np.arange(start.size)).reshape(start.shape), cone)
     best, angle = start, float(pairwise_angles(start).min())
@@ -215,14 +221,17 @@ def _spread(start: Array, cone: float) -> tuple[Array, float]:
         progress = k / STEPS
         power = 5.0 * 150.0**progress
         step = 0.15 * (0.002 / 0.3) ** progress
-        squared = 2.0 - 2.0 * (x @ x.T)
+        squared = np.maximum(2.0 - 2.0 * (x @ x.T), 1e-12)
         np.fill_diagonal(squared, 9.0)
-        weights = (squared.min() / np.maximum(squared, 1e-12)) ** power
+        nearest = float(squared.min())
+        reached = 2.0 * math.asin(min(0.5 * math.sqrt(nearest), 1.0))
+        if reached > angle:
+            best, angle = x, reached
+            if angle >= enough:
+                break
+        weights = (nearest / squared) ** power
         push = weights.sum(axis=1, keepdims=True) * x - weights @ x
         x = _clip(x + step * push / max(float(np.linalg.norm(push, axis=1).max()), 1e-12), cone)
-        reached = float(pairwise_angles(x).min())
-        if reached > angle:
-            best, angle = x.copy(), reached
     return best, angle
 
 

@@ -1,6 +1,6 @@
 """The paper's allocation problem on its manifold: exact Newton steps at O(n) cost.
 
-Problem (paper eq. 7), with unit directions ``alpha_i`` from drone to load and wanted force ``F``::
+Problem (paper eq. 14), with unit directions ``alpha_i`` from drone to load and wanted force ``F``::
 
     min  J = 1/2 sum T_i^2 + mu sum_{i<j} (alpha_i . alpha_j)^2
     s.t. sum T_i alpha_i = -F,   T_i >= 0,   |alpha_i| = 1

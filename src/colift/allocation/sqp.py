@@ -1,4 +1,4 @@
-"""The paper's allocator: SQP on the tension and alignment cost, problem unchanged (paper eq. 7)."""
+"""The paper's allocator: SQP on the tension and alignment cost, problem unchanged (paper eq. 14)."""
 
 from __future__ import annotations
 
@@ -82,6 +82,8 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
         if transport:
             newton.rotate(n, memory[1], memory[2], memory[3], fx, fy, fz, alpha, lam)
     else:
+        # The optimum's multiplier has the opposite sign: starting here makes the first step bolder,
+        # and far fewer cold starts end on a saddle with a slack cable.
         lam[0] = -fx / n
         lam[1] = -fy / n
         lam[2] = -fz / n

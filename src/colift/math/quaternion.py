@@ -29,7 +29,7 @@ def third_axis(w, x, y, z):  # type: ignore[no-untyped-def]
 
 @inline
 def from_thrust_direction(ux, uy, uz):  # type: ignore[no-untyped-def]
-    """Zero-yaw attitude whose third axis is the unit vector u (paper section 2.4).
+    """Zero-yaw attitude whose third axis is the unit vector u (paper section 2.3).
 
     Near ``u = -e3``, where the formula divides by zero, the limit along x is returned.
     """

@@ -38,10 +38,10 @@ def drawings(result: Reproduction) -> list[Drawing]:
     sides = {d.name: d for d in draw({k: COMPARISONS[k] for k in ("tensions", "angles")}, patterns)}
     last = draw({"sensitivity": COMPARISONS["sensitivity"]}, weights)[0]
     chosen = (
-        ("Fig. 3 (a) and the paper's snapshot", own["path"]),
-        ("Fig. 3 (b)", own["position_error"]),
-        ("Fig. 4, baselines against SQP", sides["tensions"]),
-        ("Fig. 5, baselines against SQP", sides["angles"]),
+        ("Figs. 3 and 4 (a)", own["path"]),
+        ("Fig. 4 (b)", own["position_error"]),
+        ("Fig. 5, baselines against SQP", sides["tensions"]),
+        ("Fig. 6, baselines against SQP", sides["angles"]),
         ("Fig. 7", own["tension_tracking"]),
         ("Fig. 8", last),
         ("Solve times", own["allocator_time"]),

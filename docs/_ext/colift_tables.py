@@ -1,0 +1,335 @@
+"""Tables that are written by the package itself, so that the pages cannot go stale.
+
+Directives: ``signal-table``, ``recording-layout``, ``quantity-table``, ``metric-table``,
+``field-table`` (fields of one section of a mission) and ``part-tables`` (all parts of one layer).
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any, ClassVar
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+from colift.metrics import all_metrics
+from colift.mission import schema
+from colift.mission.load import DEFAULT_KINDS
+from colift.part import LAYERS, find, names
+from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
+from colift.team import Team
+
+GREEK = ("alpha", "beta", "gamma", "rho", "tau", "mu", "Omega", "omega", "lam")
+
+# Symbol of each quantity that is not a signal: LaTeX, where it lives, shape, unit, frame. A name that
+# the package does not know stops the build.
+TEAM = (
+    ("n", "n", "()", "1", "-"),
+    ("m_L", "load_mass", "()", "kg", "-"),
+    ("m_i", "masses", "(n,)", "kg", "-"),
+    (r"J_i", "inertias", "(n, 3)", "kg m^2", "body"),
+    ("L_i", "cable_lengths", "(n,)", "m", "-"),
+    ("g", "gravity", "()", "m/s^2", "-z of the world"),
+)
+GAINS = (
+    (r"k_{pL}", "load_control", "pid", "k_p", "N/m", "world axes"),
+    (r"k_{dL}", "load_control", "pid", "k_d", "N s/m", "world axes"),
+    (r"k_{iL}", "load_control", "pid", "k_i", "N/(m s)", "world axes"),
+    (r"\mu", "allocation", "sqp", "mu", "N^2", "-"),
+    (r"k_{pi}", "position_control", "pid", "k_p", "N/m", "world axes"),
+    (r"k_{di}", "position_control", "pid", "k_d", "N s/m", "world axes"),
+    (r"k_{ii}", "position_control", "pid", "k_i", "N/(m s)", "world axes"),
+    (r"\rho_i", "attitude_control", "manifold", "rho", "1/s", "body axes"),
+    (r"K_{di}", "attitude_control", "manifold", "k_d", "N m s", "body axes"),
+    (r"\beta_i", "attitude_control", "manifold", "beta", "N m", "body axes"),
+    (r"\gamma_i", "attitude_control", "manifold", "gamma", "s", "body axes"),
+)
+# Same number, other unit word: what the field documents must agree with GAINS.
+UNIT = re.compile(
+    r"(?:^|, )((?:kg m\^2|m/s\^2|N/\(m s\)|N s/m|N m s|N\^2|N/m|N m|rad/s|kg|m/s|m s|1/s|degrees|rad|N|m|s))"
+    r"(?=$|[ .;,(])"
+)
+
+
+def latex(symbol: str) -> str:
+    """LaTeX of a signal's symbol such as ``alpha_dot_i``; empty for a signal without one."""
+    if symbol in ("-", ""):
+        return ""
+    head, *rest = symbol.split("_")
+    head = f"\\{head}" if head in GREEK else head
+    if rest and rest[0] == "dot":
+        head, rest = f"\\dot{{{head}}}", rest[1:]
+    return f"{head}_{{{''.join(rest)}}}" if rest else head
+
+
+def shape_text(signal: Signal, lead: str = "") -> str:
+    sizes = ([lead] if lead else []) + [str(size) for size in signal.shape]
+    return f"({sizes[0]},)" if len(sizes) == 1 else f"({', '.join(sizes)})"
+
+
+def code(text: str) -> nodes.Node:
+    return nodes.literal(text, text)
+
+
+def math(text: str) -> nodes.Node:
+    return nodes.math(text, text) if text else nodes.Text("-")
+
+
+def cell(content: str | nodes.Node) -> nodes.entry:
+    paragraph = nodes.paragraph()
+    if isinstance(content, nodes.Node):
+        paragraph += content
+    else:  # double backticks, as in docstrings, become code
+        for k, piece in enumerate(re.split(r"``(.+?)``", content)):
+            if piece:
+                paragraph += code(piece) if k % 2 else nodes.Text(piece)
+    entry = nodes.entry()
+    entry += paragraph
+    return entry
+
+
+WIDTHS = {
+    "symbol": 10, "name": 24, "shape": 11, "unit": 11, "frame": 11, "meaning": 40, "default": 14,
+    "field": 16, "type": 14, "range": 15, "data set": 30, "metric": 30,
+}  # fmt: skip
+
+
+def table(head: list[str], rows: list[list[Any]]) -> nodes.table:
+    """A docutils table; cells are text or nodes."""
+    group = nodes.tgroup(cols=len(head))
+    group += [nodes.colspec(colwidth=WIDTHS[name]) for name in head]
+    for holder, lines in ((nodes.thead(), [head]), (nodes.tbody(), rows)):
+        for line in lines:
+            row = nodes.row()
+            row += [cell(content) for content in line]
+            holder += row
+        group += holder
+    result = nodes.table(classes=["colift"])
+    result += group
+    return result
+
+
+class SignalTable(SphinxDirective):
+    """Symbol table of everything that flows between the layers."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = [
+            [math(latex(s.symbol)), code(s.name), code(shape_text(s)), s.unit, s.frame, s.meaning]
+            for s in (*SIGNALS, *CYCLE_SIGNALS)
+        ]
+        return [table(["symbol", "name", "shape", "unit", "frame", "meaning"], rows)]
+
+
+class QuantityTable(SphinxDirective):
+    """Symbols of the team and of the gains: name in the API, unit, frame, default."""
+
+    def run(self) -> list[nodes.Node]:
+        team = Team.uniform(2)
+        rows = []
+        for symbol, name, shape, unit, frame in TEAM:
+            value = getattr(team, name)  # stops the build when a name has gone
+            actual = "()" if not hasattr(value, "shape") else str(value.shape).replace("2", "n")
+            if actual != shape:
+                raise self.error(f"Team.{name} has shape {actual}, the table says {shape}")
+            rows.append([math(symbol), code(f"Team.{name}"), code(shape), unit, frame, "-"])
+        for symbol, layer, kind, name, unit, frame in GAINS:
+            field = find(layer, kind).model_fields[name]
+            found = UNIT.search(field.description or "")
+            if found is None or found.group(1) != unit:
+                raise self.error(f"{layer}.{name}: unit {unit} is not in {field.description!r}")
+            shape = "(3,)" if isinstance(field.default, tuple) else "()"
+            text = shown(field.default)
+            rows.append([math(symbol), code(f"{layer}.{name}"), code(shape), unit, frame, text])
+        return [table(["symbol", "name", "shape", "unit", "frame", "default"], rows)]
+
+
+class RecordingLayout(SphinxDirective):
+    """Every data set of a recording."""
+
+    def run(self) -> list[nodes.Node]:
+        rows: list[list[Any]] = [
+            [code("/time"), code("(rows,)"), "s", "-", "time of each row of ``/signals``"]
+        ]
+        rows += [
+            [code(f"/signals/{s.name}"), code(shape_text(s, "rows")), s.unit, s.frame, s.meaning]
+            for s in SIGNALS
+        ]
+        rows.append(
+            [code("/allocator/time"), code("(cycles,)"), "s", "-", "time of each allocation"]
+        )
+        for s in CYCLE_SIGNALS:
+            short = s.name.removeprefix("allocator_")
+            name = "solve_time" if short == "time" else short
+            text = shape_text(s, "cycles")
+            rows.append([code(f"/allocator/{name}"), code(text), s.unit, s.frame, s.meaning])
+        return [table(["data set", "shape", "unit", "frame", "meaning"], rows)]
+
+
+class MetricTable(SphinxDirective):
+    """Every metric of a flight."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = [[code(m.name), m.unit, m.meaning] for m in all_metrics()]
+        return [table(["metric", "unit", "meaning"], rows)]
+
+
+def shown(value: Any) -> str:
+    """A default as it stands in a mission file."""
+    if isinstance(value, bool):
+        return f"``{str(value).lower()}``"
+    if isinstance(value, str):
+        return f'``"{value}"``' if value else '``""``'
+    if isinstance(value, list | tuple):
+        inner = ", ".join(shown(item).strip("`") for item in value)
+        return f"``[{inner}]``"
+    if isinstance(value, float):
+        return f"``{value:g}``" if value else "``0``"
+    return f"``{value}``"
+
+
+def kind_of(spec: dict[str, Any], defs: dict[str, Any]) -> str:
+    """What a field holds, in words, from its JSON schema."""
+    spec = resolve(spec, defs)
+    members = spec.get("anyOf") or spec.get("oneOf")
+    if members:
+        words = [kind_of(m, defs) for m in members if resolve(m, defs).get("type") != "null"]
+        return " or ".join(dict.fromkeys(words))
+    if "enum" in spec:
+        return ", ".join(f'``"{value}"``' for value in spec["enum"])
+    if "const" in spec:
+        return f'``"{spec["const"]}"``'
+    words = {"number": "number", "integer": "whole number", "boolean": "true or false"}
+    if spec.get("type") == "array":
+        count = len(spec.get("prefixItems", ()))
+        inner = spec["prefixItems"][0] if count else spec.get("items", {})
+        word = kind_of(inner, defs)
+        return (
+            f"{count} {word}s"
+            if count
+            else f"list of {word}s"
+            if word == "number"
+            else f"list, each {word}"
+        )
+    return words.get(spec.get("type", ""), "text" if spec.get("type") == "string" else "any")
+
+
+def range_of(spec: dict[str, Any], defs: dict[str, Any]) -> str:
+    """Allowed range in words, from the JSON schema; of lists, of each entry."""
+    spec = resolve(spec, defs)
+    members = spec.get("anyOf") or spec.get("oneOf")
+    if members:
+        found = [range_of(member, defs) for member in members]
+        return next((text for text in found if text != "-"), "-")
+    if spec.get("type") == "array":
+        inner = range_of((spec.get("prefixItems") or [spec.get("items", {})])[0], defs)
+        each = inner if inner == "-" or inner.startswith("each") else f"each {inner}"
+        low, high = spec.get("minItems"), spec.get("maxItems")
+        if not spec.get("prefixItems") and (low or high):
+            each = f"{low or 0} to {high or 'any'} entries" + ("" if each == "-" else f", {each}")
+        return each
+    parts = [
+        f"{sign} " + ("2^63" if spec[key] == 2**63 else f"{spec[key]:g}")
+        for key, sign in (
+            ("exclusiveMinimum", ">"), ("minimum", "≥"), ("exclusiveMaximum", "<"), ("maximum", "≤"),
+        )
+        if key in spec
+    ]  # fmt: skip
+    if "maxLength" in spec:
+        parts.append(f"{spec.get('minLength', 0)} to {spec['maxLength']} characters")
+    if "pattern" in spec:
+        pattern = re.sub(r"\\(.)|[\^$]", r"\1", spec["pattern"])
+        parts.append(f"matches ``{pattern}``")
+    return ", ".join(parts) or "-"
+
+
+def resolve(spec: dict[str, Any], defs: dict[str, Any]) -> dict[str, Any]:
+    return defs[spec["$ref"].rpartition("/")[2]] if "$ref" in spec else spec
+
+
+def field_rows(model: Any, skip: tuple[str, ...] = ()) -> list[list[Any]]:
+    """One row per field of a pydantic model."""
+    described = model.model_json_schema()
+    defs = described.get("$defs", {})
+    rows: list[list[Any]] = []
+    for name, field in model.model_fields.items():
+        if name in skip:
+            continue
+        spec = described["properties"][name]
+        text = field.description or ""
+        unit = UNIT.search(text)
+        if unit and text.strip(" .") == unit.group(1):
+            text = name.replace("_", " ")
+        required = field.is_required()
+        default = "required" if required else "-" if field.default is None else shown(field.default)
+        rows.append(
+            [
+                code(name), kind_of(spec, defs), unit.group(1) if unit else "-", default,
+                range_of(spec, defs), text,
+            ]
+        )  # fmt: skip
+    return rows
+
+
+FIELD_HEAD = ["field", "type", "unit", "default", "range", "meaning"]
+
+
+class FieldTable(SphinxDirective):
+    """Fields of one section of a mission; without an argument, the fields at the top."""
+
+    optional_arguments = 1
+    sections: ClassVar[dict[str, str]] = {
+        "world": "World",
+        "load": "Load",
+        "drones": "Drones",
+        "start": "Start",
+        "timing": "Timing",
+        "events": "Event",
+    }
+
+    def run(self) -> list[nodes.Node]:
+        if self.arguments:
+            return [
+                table(FIELD_HEAD, field_rows(getattr(schema, self.sections[self.arguments[0]])))
+            ]
+        plain = ("name", "description", "seed")
+        known = {*plain, *self.sections, "kinds", *LAYERS}
+        if missing := set(schema.Mission.model_fields) - known:
+            raise self.error(f"the mission has sections that this page lacks: {sorted(missing)}")
+        skip = tuple(known - set(plain))
+        return [table(FIELD_HEAD, field_rows(schema.Mission, skip))]
+
+
+class PartTables(SphinxDirective):
+    """All parts of one layer: what each is, and its settings."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        layer = self.arguments[0]
+        out: list[nodes.Node] = []
+        for kind in names(layer):
+            part = find(layer, kind)
+            note = " (default)" if DEFAULT_KINDS.get(layer) == kind else ""
+            line = (part.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
+            paragraph = nodes.paragraph()
+            paragraph += [nodes.strong("", "", code(f'kind = "{kind}"')), nodes.Text(f"{note}: ")]
+            paragraph += cell(re.sub(r"\s+", " ", line)).children[0].children
+            out.append(paragraph)
+            rows = field_rows(part)
+            if rows:
+                out.append(table(FIELD_HEAD, rows))
+        return out
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the directives."""
+    app.add_directive("signal-table", SignalTable)
+    app.add_directive("quantity-table", QuantityTable)
+    app.add_directive("recording-layout", RecordingLayout)
+    app.add_directive("metric-table", MetricTable)
+    app.add_directive("field-table", FieldTable)
+    app.add_directive("part-tables", PartTables)
+    # The pages follow the package, not only their own text: read them anew each time.
+    app.connect("env-get-outdated", lambda _app, env, *_: sorted(env.found_docs))
+    return {"version": "1", "parallel_read_safe": True}

@@ -1,0 +1,39 @@
+"""A plant of your own: the rigid cables, with linear air drag on the load.
+
+It wraps the kernel of an existing plant. A plant from scratch overrides ``observe`` as well and keeps
+whatever state it likes in its memory.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.jit import kernel
+from colift.plant.base import STEP_SIGNATURE
+from colift.plant.rigid_cables import RigidCables
+
+rigid_step = RigidCables.kernel
+
+
+@kernel(STEP_SIGNATURE)
+def step(thrusts, torques, external, dt, params, memory, tensions, slack_times):
+    n = thrusts.shape[0]
+    drag = params[params.shape[0] - 1]
+    for k in range(3):  # memory[3:6] is the velocity of the load
+        external[n, k] -= drag * memory[3 + k]
+    rigid_step(thrusts, torques, external, dt, params, memory, tensions, slack_times)
+    for k in range(3):
+        external[n, k] = 0.0
+
+
+class DraggyCables(RigidCables):
+    """Rigid cables and a load with drag."""
+
+    kernel = step
+
+    drag: Annotated[float, Field(ge=0.0)] = 0.05
+    """Drag of the load per speed, N s/m."""
+
+    def params(self, team):
+        return np.append(super().params(team), self.drag)

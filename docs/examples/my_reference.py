@@ -1,0 +1,37 @@
+"""A reference of your own: the load swings up and down."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.jit import kernel
+from colift.reference.base import SIGNATURE, ReferencePart
+
+
+@kernel(SIGNATURE)
+def bob(t, params, reference):
+    height, amplitude, rate = params[0], params[1], params[2]
+    reference[:] = 0.0
+    # Starts at rest: 1 - cos, and its derivatives.
+    reference[0, 2] = height + amplitude * (1.0 - math.cos(rate * t))
+    reference[1, 2] = amplitude * rate * math.sin(rate * t)
+    reference[2, 2] = amplitude * rate**2 * math.cos(rate * t)
+    reference[3, 2] = -amplitude * rate**3 * math.sin(rate * t)
+
+
+class Bob(ReferencePart):
+    """Up and down about a fixed point."""
+
+    kernel = bob
+
+    height: float = 1.0
+    """Lowest point, m."""
+    amplitude: Annotated[float, Field(ge=0.0)] = 0.2
+    """Half of the stroke, m."""
+    period: Annotated[float, Field(gt=0.0)] = 4.0
+    """Time of one stroke up and down, s."""
+
+    def params(self, team):
+        return np.array([self.height, self.amplitude, 2.0 * np.pi / self.period])
