@@ -26,4 +26,4 @@ def test_every_example_flies_twice(tmp_path: Path) -> None:
 
 
 def test_an_allocator_of_ones_own_is_one_short_file() -> None:
-    assert len((EXAMPLES / "my_allocator.py").read_text().splitlines()) <= 40
+    assert len((EXAMPLES / "my_plain_allocator.py").read_text().splitlines()) <= 40
