@@ -53,7 +53,7 @@ def integral(values: NDArray[np.float64], time: NDArray[np.float64]) -> float:
 
 
 def _total(recording: Recording) -> NDArray[np.float64]:
-    return np.asarray(np.abs(recording["tensions"]).sum(axis=1))
+    return np.asarray(np.nansum(np.abs(recording["tensions"]), axis=1))
 
 
 def _smallest_angle(directions: NDArray[np.float64]) -> float:
@@ -62,7 +62,8 @@ def _smallest_angle(directions: NDArray[np.float64]) -> float:
     # In slices: pairs grow as n^2, and memory should not.
     rows = max(1, 2_000_000 // directions.shape[1] ** 2)
     parts = range(0, len(directions), rows)
-    return float(np.degrees(min(pairwise_angles(directions[k : k + rows]).min() for k in parts)))
+    smallest = [np.nanmin(pairwise_angles(directions[k : k + rows])) for k in parts]
+    return float(np.degrees(min(smallest)))
 
 
 @_metric("m", "root mean square of the load's distance from its reference")
@@ -97,7 +98,7 @@ def mean_total_tension_N(r: Recording) -> float:
 
 @_metric("N", "largest tension of any cable")
 def peak_tension_N(r: Recording) -> float:
-    return float(r["tensions"].max())
+    return float(np.nanmax(r["tensions"]))
 
 
 @_metric("N s", "sum of tensions integrated over the first 10 s (the paper's J_T)")
@@ -115,18 +116,18 @@ def tension_integral_Ns(r: Recording) -> float:
 
 @_metric("N", "root mean square of actual less wanted tension, over all cables")
 def tension_tracking_rms_N(r: Recording) -> float:
-    return float(np.sqrt(np.mean((r["tensions"] - r["desired_tensions"]) ** 2)))
+    return float(np.sqrt(np.nanmean((r["tensions"] - r["desired_tensions"]) ** 2)))
 
 
 @_metric("1", "largest over smallest mean tension of the cables")
 def tension_imbalance(r: Recording) -> float:
-    means = r["tensions"].mean(axis=0)
+    means = np.nanmean(r["tensions"], axis=0)
     return float(means.max() / means.min()) if means.min() > 0 else float("inf")
 
 
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
-    return float(r["slack_times"][-1].sum())
+    return float(np.nanmax(r["slack_times"], axis=0).sum())
 
 
 @_metric("1", "allocations that ended with a status other than ok")

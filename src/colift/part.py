@@ -58,6 +58,15 @@ class Part(BaseModel):
         """Memory vector of the kernel in its initial state (integrators, warm starts, scratch)."""
         return np.zeros(0)
 
+    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
+        """Memory after ``drone`` has left; ``team`` is what remains.
+
+        What does not depend on the number of drones is kept, anything else starts anew; a part that
+        remembers something per drone overrides this.
+        """
+        fresh = self.memory(team)
+        return memory if fresh.size == memory.size else fresh
+
     def check(self, team: Team) -> list[tuple[str, str]]:
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""
         return []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,15 @@ class Team:
     def n(self) -> int:
         """Number of drones."""
         return int(self.masses.shape[0])
+
+    def without(self, drone: int) -> Team:
+        """The team after one drone has left."""
+        return replace(
+            self,
+            masses=np.delete(self.masses, drone),
+            inertias=np.delete(self.inertias, drone, axis=0),
+            cable_lengths=np.delete(self.cable_lengths, drone),
+        )
 
     @classmethod
     def uniform(

@@ -91,7 +91,7 @@ def test_controllers_are_told_their_period(monkeypatch):
         )  # fmt: skip
         flight = Flight(mission)
         flight.run()
-        errors.append(flight._memory.load_control[2])
+        errors.append(flight._legs[-1].memory.load_control[2])
     assert errors[0] == pytest.approx(errors[1], rel=0.1)
     assert errors[0] > 1e-4
 
@@ -127,7 +127,7 @@ def test_several_events_hold_from_their_time_on():
     monitor = flight._advance
 
     def advance(stop):
-        seen.append((flight._step, flight._params.plant[0]))
+        seen.append((flight._step, flight._legs[-1].params.plant[0]))
         monitor(stop)
 
     flight._advance = advance

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 STEPS = 400
 """Ascent steps from one start of the search for a wide formation."""
+SEARCHED = 128
+"""Most cables for which a formation is searched to decide on a conflict."""
 STARTS = 6
 """Random starts of that search, after the regular ones."""
 
@@ -108,7 +110,9 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
     cone = math.radians(settings.max_cone_deg)
     least = math.radians(settings.min_angle_deg)
     if n > 1:
-        angle = widest_formation(n, cone, enough=least)[1]
+        angle = packing_bound(n, cone)
+        if angle >= least and n <= SEARCHED:
+            angle = widest_formation(n, cone, enough=least)[1]
         if angle < least:
             found.append(
                 (
@@ -156,6 +160,19 @@ def spread_formation(n: int, cone: float, min_angle: float) -> Array:
             f"{n} cables in it are at most {math.degrees(angle):.1f} deg apart"
         )
     return best
+
+
+def packing_bound(n: int, cone: float) -> float:
+    """An angle (rad) that n cables in the cone cannot all keep: their caps would not fit side by side.
+
+    Caps of half the least angle are disjoint and lie within the cone widened by as much.
+    """
+    low, high = 0.0, 2.0 * cone
+    for _ in range(50):
+        half = 0.25 * (low + high)
+        fits = n * (1.0 - math.cos(half)) <= 1.0 - math.cos(min(cone + half, math.pi))
+        low, high = (2.0 * half, high) if fits else (low, 2.0 * half)
+    return high
 
 
 def widest_angle(n: int, cone: float) -> float:

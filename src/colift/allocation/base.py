@@ -70,6 +70,10 @@ class AllocatorPart(Part):
 
     layer: ClassVar[str] = "allocation"
 
+    def without(self, drone: int) -> AllocatorPart:
+        """Settings after ``drone`` has left; one with values per cable drops that cable's."""
+        return self
+
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""
         return float("nan")

@@ -215,6 +215,7 @@ def _cross_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             yield Problem(
                 "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
             )
+    left = set(range(n))
     for i, event in enumerate(frame.events):
         if "timing" not in broken and event.at > timing.duration:
             yield Problem(
@@ -223,6 +224,14 @@ def _cross_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
                 f"must be within timing.duration = {timing.duration:g} s",
             )
         section, _, name = event.field.partition(".")
+        if section == "drones" and "drones" not in broken:
+            if type(event.value) is not int or event.value not in left or len(left) == 1:
+                flying = ", ".join(map(str, sorted(left)))
+                message = f"must be one of the drones that fly then ({flying}), not the last one"
+                yield Problem(f"events.{i}.value", repr(event.value), message)
+            else:
+                left.remove(event.value)
+            continue
         model = frame.load if section == "load" else parts.get(section)
         if model is None:
             continue

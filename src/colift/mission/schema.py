@@ -165,10 +165,11 @@ class Event(Section):
 
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
-    field: Annotated[str, Field(pattern=r"^(load\.mass|allocation\.[a-z_]+)$")]
-    """What changes: ``load.mass`` (the plant's only) or a setting of the allocator."""
+    field: Annotated[str, Field(pattern=r"^(load\.mass|drones\.lose|allocation\.[a-z_]+)$")]
+    """What changes: ``load.mass`` (the plant's only), a setting of the allocator, or ``drones.lose``."""
     value: Any
-    """New value, in the field's unit."""
+    """New value, in the field's unit; for ``drones.lose`` the number, from 0, of the drone whose cable is
+    cut and that leaves the team, which is told at once."""
 
 
 class Frame(Section):

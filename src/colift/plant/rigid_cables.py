@@ -212,3 +212,10 @@ class RigidCables(PlantPart):
         drones[:, 0:3] = start.directions
         drones[:, 6:10] = start.attitudes
         return memory
+
+    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
+        kept = self.memory(team)
+        drones = memory[6 : state_size(team.n + 1)].reshape(team.n + 1, _DRONE)
+        kept[:6] = memory[:6]
+        kept[6 : state_size(team.n)] = np.delete(drones, drone, axis=0).ravel()
+        return kept

@@ -135,3 +135,7 @@ class Pid(PositionControlPart):
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(1 + _SLOTS * team.n)
+
+    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
+        slots = np.delete(memory[1:].reshape(team.n + 1, _SLOTS), drone, axis=0)
+        return np.concatenate([memory[:1], slots.ravel()])

@@ -50,9 +50,9 @@ def sensitivity(recordings: Recordings) -> Figure:
         look, flight = style.series(k), panels.intact(recording)
         values = flight["tensions"]
         seen.append(values)
-        low, high = values.min(axis=1), values.max(axis=1)
+        low, high = np.nanmin(values, axis=1), np.nanmax(values, axis=1)
         panels.band(left, flight.time, low, high, color=look["color"], alpha=0.2)
-        panels.line(left, flight.time, values.mean(axis=1), label=label, **look)
+        panels.line(left, flight.time, np.nanmean(values, axis=1), label=label, **look)
         panels.line(right, *panels.smallest_angle(flight), **look)
     panels.focus([left], [np.concatenate(seen, axis=None)])
     panels.safe_angle(right)

@@ -66,23 +66,13 @@ def intact(recording: Recording) -> Recording:
     if recording.outcome == "completed":
         return recording
     team = recording.mission.team
-    names = (
-        "load",
-        "tensions",
-        "desired_tensions",
-        "directions",
-        "desired_directions",
-        "positions",
-    )
-    flat = np.concatenate(
-        [recording[name].reshape(len(recording.time), -1) for name in names], axis=1
-    )
     most = 100.0 * team.load_mass * max(team.gravity, 1.0)
     with np.errstate(all="ignore"):
-        good = np.isfinite(flat).all(axis=1)
+        good = np.isfinite(recording["load"]).all(axis=(1, 2))
         good &= np.linalg.norm(tracking_error(recording), axis=1) < 5.0 * team.cable_lengths.max()
         for name in ("tensions", "desired_tensions"):
-            good &= np.abs(recording[name]).sum(axis=1) < most
+            total = np.nansum(np.abs(recording[name]), axis=1)
+            good &= (total < most) & np.isfinite(recording[name]).any(axis=1)
     rows = len(good) if good.all() else max(1, int(np.argmin(good)))
     arrays = {
         name: values if name.startswith("allocator_") else values[:rows]
@@ -119,9 +109,14 @@ def per_drone(axes: Axes, time: Array, values: Array) -> None:
             line(axes, time, values[:, i], label=style.drone_label(i), **style.drone(i))
         return
     band(
-        axes, time, values.min(axis=1), values.max(axis=1), color="#9DC3DE", label=f"all {n} drones"
+        axes,
+        time,
+        np.nanmin(values, axis=1),
+        np.nanmax(values, axis=1),
+        color="#9DC3DE",
+        label=f"all {n} drones",
     )
-    line(axes, time, values.mean(axis=1), color=style.PALETTE[0], label="mean")
+    line(axes, time, np.nanmean(values, axis=1), color=style.PALETTE[0], label="mean")
 
 
 def focus(panels: Sequence[Axes], values: Sequence[Array]) -> None:
@@ -130,7 +125,7 @@ def focus(panels: Sequence[Axes], values: Sequence[Array]) -> None:
     The axis then holds the middle 98 % of all values with some room; a note in each panel that is
     cut tells its whole range.
     """
-    flat = np.concatenate([part.ravel() for part in values])
+    flat = np.concatenate([part[np.isfinite(part)] for part in values])
     if not len(flat):
         return
     low, high = flat.min(), flat.max()
@@ -142,8 +137,9 @@ def focus(panels: Sequence[Axes], values: Sequence[Array]) -> None:
     box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
     for axes, part in zip(panels, values, strict=True):
         axes.set_ylim(bottom, top)
-        if part.min() < bottom or part.max() > top:
-            note = f"off scale: {part.min():.3g} to {part.max():.3g}".replace("-", "\u2212")
+        least, most = np.nanmin(part), np.nanmax(part)
+        if least < bottom or most > top:
+            note = f"off scale: {least:.3g} to {most:.3g}".replace("-", "\u2212")
             axes.text(0.985, 0.965, note, transform=axes.transAxes, ha="right", va="top", bbox=box)
 
 
@@ -188,7 +184,7 @@ def desired_tensions(axes: Axes, recording: Recording) -> Array:
     flight = intact(recording)
     wanted = flight["desired_tensions"]
     if recording.n > style.MANY:
-        wanted = wanted.mean(axis=1, keepdims=True)
+        wanted = np.nanmean(wanted, axis=1, keepdims=True)
     for i, values in enumerate(wanted.T):
         name = ("wanted" if recording.n <= style.MANY else "wanted, mean") if i == 0 else None
         line(
@@ -215,7 +211,7 @@ def tension_error(axes: Axes, recording: Recording) -> Array:
 def nearest_angles(directions: Array) -> tuple[NDArray[np.intp], Array, Array]:
     """Angle of each cable to its nearest one (rows, n) and of the widest pair (rows,), rad.
 
-    Returns also which rows were used: all, unless that would take more than some seconds.
+    A drone that has left counts as opposite to all others. Returns also which rows were used: all, unless that would take more than some seconds.
     """
     n = directions.shape[1]
     every = max(1, int(len(directions) * n * n / 2e8))
@@ -226,8 +222,9 @@ def nearest_angles(directions: Array) -> tuple[NDArray[np.intp], Array, Array]:
     for k in range(0, len(chosen), slices):
         part = directions[chosen[k : k + slices]]
         cosines = part @ part.swapaxes(1, 2)
-        widest.append(cosines.min(axis=(1, 2)))
+        widest.append(np.nanmin(cosines, axis=(1, 2)))
         cosines[:, diagonal, diagonal] = -2.0
+        cosines[np.isnan(cosines)] = -2.0  # a drone that has left is near to none
         nearest.append(cosines.max(axis=2))
     # arccos loses digits near zero, but 1e-8 rad is no matter in a figure.
     to_angle = [np.arccos(np.clip(np.concatenate(c), -1.0, 1.0)) for c in (nearest, widest)]
@@ -347,7 +344,8 @@ def path(axes: Any, recording: Recording) -> None:
         axes.text(
             x, y, z, f"\u00a0\u00a0 {flight.time[row]:.3g} s", fontsize=8, color="#444444", va="top"
         )
-    _equal_box(axes, np.concatenate([wanted, flown, drones.reshape(-1, 3)]))
+    places = drones.reshape(-1, 3)
+    _equal_box(axes, np.concatenate([wanted, flown, places[np.isfinite(places).all(axis=1)]]))
     for name in "xyz":
         getattr(axes, f"set_{name}label")(f"{name} (m)", labelpad=0.0)
         axes.tick_params(axis=name, pad=0.0)

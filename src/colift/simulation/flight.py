@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colift.allocation.base import INFO_SIZE
 from colift.geometry import min_norm_tensions, zero_yaw_quaternion
-from colift.mission.schema import Mission
-from colift.part import LAYERS
+from colift.mission.schema import Event, Mission
+from colift.part import LAYERS, Vector
 from colift.plant.base import Start
 from colift.recording import Recording
 from colift.simulation.loop import CYCLE_WIDTH, Periods, Vectors, advance, is_compiled
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, columns, make_bus
+from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus, columns, make_bus
+from colift.team import Team
 
 Progress = Callable[[float], None]
 """Called with the fraction flown, between 0 and 1."""
@@ -39,26 +41,24 @@ class Flight:
 
     def __init__(self, mission: Mission) -> None:
         self.mission = mission
-        team = mission.team
-        parts = {layer: getattr(mission, layer) for layer in LAYERS}
-        kernels = [type(parts[layer]).kernel for layer in LAYERS[:-1]]
-        plant = type(parts["plant"])
+        plant = type(mission.plant)
+        kernels = [type(getattr(mission, layer)).kernel for layer in LAYERS[:-1]]
         self._kernels = [*kernels, plant.observe, plant.kernel]
         self.compiled = all(is_compiled(kernel) for kernel in self._kernels)
         self.loop_time = 0.0
-        self._every = Periods(mission.timing.step, **mission.timing.multiples())
-        self._bus = make_bus(team.n)
-        self._bus.desired_directions[:] = mission.start_directions()
-        self._params = Vectors(*(parts[layer].params(team) for layer in LAYERS))
-        memory = {layer: parts[layer].memory(team) for layer in LAYERS[:-1]}
-        memory["plant"] = mission.plant.initial(team, start_state(mission))
-        self._memory = Vectors(**memory)
-        steps = mission.timing.steps
-        self._log = np.zeros(((steps - 1) // self._every.recording + 1, self._bus.row.size))
-        self._cycles = np.zeros(((steps - 1) // self._every.allocation + 1, CYCLE_WIDTH))
-        self._info = np.zeros(INFO_SIZE)
-        self._step = 0
         self.outcome = "completed"
+        self._step = 0
+        self._every = Periods(mission.timing.step, **mission.timing.multiples())
+        self._cycles = np.zeros((self._rows(self._every.allocation), CYCLE_WIDTH))
+        self._info = np.zeros(INFO_SIZE)
+        team = mission.team
+        memory = {layer: getattr(mission, layer).memory(team) for layer in LAYERS[:-1]}
+        memory["plant"] = mission.plant.initial(team, start_state(mission))
+        self._allocation = mission.allocation
+        self._load_mass = team.load_mass
+        self._legs: list[_Leg] = []
+        self._begin_leg(tuple(range(team.n)), team, memory)
+        self._legs[-1].bus.desired_directions[:] = mission.start_directions()
 
     def run(self, progress: Progress | None = None) -> Recording:
         """Fly from where we are to the end of the mission.
@@ -66,27 +66,38 @@ class Flight:
         A flight whose numbers stop being finite ends there; the recording says so in ``outcome``.
         """
         steps = self.mission.timing.steps
-        stops = self._stops()
-        for stop in stops:
-            self._apply_events()
+        for stop in self._stops():
+            for event in self.mission.events:
+                if self._event_step(event) == self._step:
+                    self._apply(event)
             self._advance(stop)
             if progress is not None:
                 progress(stop / steps)
-            if not np.isfinite(self._bus.row).all():
+            if not np.isfinite(self._legs[-1].bus.row).all():
                 self.outcome = f"diverged before t = {stop * self._every.step:g} s"
                 break
         return self.recording()
 
     def recording(self) -> Recording:
-        """What has been recorded so far."""
-        every = self._every
-        rows = (self._step - 1) // every.recording + 1
-        cycles = (self._step - 1) // every.allocation + 1
-        n = self.mission.drones.count
-        where = columns(n)
-        arrays = {
-            s.name: self._log[:rows, where[s.name]].reshape(rows, *s.shape_for(n)) for s in SIGNALS
-        }
+        """What has been recorded so far; NaN for a drone that has left."""
+        every, n = self._every, self.mission.drones.count
+        rows = -(-self._step // every.recording)
+        cycles = -(-self._step // every.allocation)
+        arrays = {s.name: np.full((rows, *s.shape_for(n)), np.nan) for s in SIGNALS}
+        ends = [*(-(-leg.first_step // every.recording) for leg in self._legs[1:]), rows]
+        begin = 0
+        for leg, end in zip(self._legs, ends, strict=True):
+            where = columns(leg.team.n)
+            for s in SIGNALS:
+                values = leg.log[begin:end, where[s.name]]
+                values = values.reshape(end - begin, *s.shape_for(leg.team.n))
+                if s.shape[0] == "n":
+                    arrays[s.name][begin:end, leg.drones] = values
+                elif s.shape[0] == "n+1":
+                    arrays[s.name][begin:end, [*leg.drones, n]] = values
+                else:
+                    arrays[s.name][begin:end] = values
+            begin = end
         for k, signal in enumerate(CYCLE_SIGNALS):
             arrays[signal.name] = self._cycles[:cycles, k]
         return Recording(
@@ -97,49 +108,107 @@ class Flight:
             outcome=self.outcome,
         )
 
+    def _begin_leg(self, drones: tuple[int, ...], team: Team, memory: dict[str, Vector]) -> None:
+        """From here on these drones of the mission fly; every layer is bound to their team."""
+        parts = {layer: getattr(self.mission, layer) for layer in LAYERS}
+        parts["allocation"] = self._allocation
+        bus = make_bus(team.n)
+        self._legs.append(
+            _Leg(
+                first_step=self._step,
+                drones=list(drones),
+                team=team,
+                bus=bus,
+                params=Vectors(*(parts[layer].params(team) for layer in LAYERS)),
+                memory=Vectors(**memory),
+                log=np.zeros((self._rows(self._every.recording), bus.row.size)),
+            )
+        )
+        self._set_load_mass(self._load_mass)
+
     def _advance(self, stop: int) -> None:
         loop: Any = advance if self.compiled else getattr(advance, "py_func", advance)
+        leg = self._legs[-1]
         begin = time.perf_counter()
         loop(
             self._step,
             stop,
             self._every,
             *self._kernels,
-            self._params,
-            self._memory,
+            leg.params,
+            leg.memory,
             self._info,
-            self._bus,
-            self._log,
+            leg.bus,
+            leg.log,
             self._cycles,
         )
         self.loop_time += time.perf_counter() - begin
         self._step = stop
 
+    def _rows(self, period: int) -> int:
+        """How often something happens that happens every ``period`` steps, the first included."""
+        return (self.mission.timing.steps - 1) // period + 1
+
     def _stops(self) -> list[int]:
         """Steps to come at which the loop pauses: each simulated second, each event, the end."""
         step, steps = self._every.step, self.mission.timing.steps
         chunk = max(1, round(CHUNK / step))
-        events = {self._event_step(event.at) for event in self.mission.events}
+        events = {self._event_step(event) for event in self.mission.events}
         return sorted(
             s for s in {*range(chunk, steps, chunk), *events, steps} if self._step < s <= steps
         )
 
-    def _event_step(self, at: float) -> int:
-        return round(at / self._every.step)
+    def _event_step(self, event: Event) -> int:
+        return round(event.at / self._every.step)
 
-    def _apply_events(self) -> None:
-        """Give plant and allocator the parameters that hold at the present step."""
-        mission, due = self.mission, {}
-        for event in sorted(self.mission.events, key=lambda event: event.at):
-            if self._event_step(event.at) <= self._step:
-                due[event.field] = event.value
-        if "load.mass" in due:
-            truth = replace(mission.team, load_mass=due.pop("load.mass"))
-            self._params.plant[:] = mission.plant.params(truth)
-        if due:
-            changed = {field.partition(".")[2]: value for field, value in due.items()}
-            part = mission.allocation.model_copy(update=changed)
-            self._params.allocation[:] = part.params(mission.team)
+    def _apply(self, event: Event) -> None:
+        """Let an event happen, now."""
+        section, _, name = event.field.partition(".")
+        leg = self._legs[-1]
+        if section == "load":
+            self._set_load_mass(event.value)
+        elif section == "drones":
+            self._lose(leg.drones.index(event.value))
+        else:
+            self._allocation = self._allocation.model_copy(update={name: event.value})
+            leg.params.allocation[:] = self._allocation.params(leg.team)
+
+    def _set_load_mass(self, mass: float) -> None:
+        self._load_mass = mass
+        leg = self._legs[-1]
+        leg.params.plant[:] = self.mission.plant.params(replace(leg.team, load_mass=mass))
+
+    def _lose(self, place: int) -> None:
+        """Cut one cable: the drone at this place of the present leg leaves the team."""
+        old = self._legs[-1]
+        team = old.team.without(place)
+        memory = {
+            layer: getattr(self.mission, layer).memory_without(
+                team, getattr(old.memory, layer), place
+            )
+            for layer in LAYERS
+        }
+        self._allocation = self._allocation.without(place)
+        self._begin_leg(tuple(np.delete(old.drones, place)), team, memory)
+        bus = self._legs[-1].bus
+        for signal in SIGNALS:
+            kept = getattr(old.bus, signal.name)
+            if signal.shape[0] in {"n", "n+1"}:
+                kept = np.delete(kept, place, axis=0)
+            getattr(bus, signal.name)[:] = kept
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """A stretch of the flight with the same drones, and what the loop needs for it."""
+
+    first_step: int
+    drones: list[int]
+    team: Team
+    bus: Bus
+    params: Vectors
+    memory: Vectors
+    log: NDArray[np.float64]
 
 
 def start_state(mission: Mission) -> Start:
