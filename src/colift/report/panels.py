@@ -79,7 +79,7 @@ def intact(recording: Recording) -> Recording:
         for name, values in recording.arrays.items()
     }
     if not good[0]:  # nothing to show; zeros can be drawn
-        arrays |= {name: np.zeros_like(arrays[name]) for name in names}
+        arrays = {name: np.zeros_like(values) for name, values in arrays.items()}
     return replace(recording, time=recording.time[:rows], arrays=arrays)
 
 
