@@ -29,14 +29,14 @@ params        (p,)      from :meth:`AllocatorPart.params`
 memory        (m,)      from :meth:`AllocatorPart.memory`; owned by the kernel
 tensions      (n,)      out: wanted tensions, N
 directions    (n, 3)    out: wanted unit directions from drone to load, world
-info          (5,)      out: see ``INFO_*``
+info          (6,)      out: see ``INFO_*``
 ============  ========  ==================================================================
 
 On entry ``tensions`` and ``directions`` hold the last answer, or the start formation.
 """
 
-INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE = range(5)
-INFO_SIZE = 5
+INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
+INFO_SIZE = 6
 
 
 class Status(enum.IntEnum):

@@ -371,7 +371,7 @@ def snapshots(flown: Array, apart: float, most: int = 4) -> list[int]:
 def _equal_box(axes: Any, points: Array) -> None:
     """One metre is as long on each axis; a flat path still gets a box of some depth."""
     low, high = points.min(axis=0), points.max(axis=0)
-    size = np.maximum(high - low, 0.3 * (high - low).max()) * 1.06
+    size = np.maximum(high - low, max(0.3 * (high - low).max(), 1e-3)) * 1.06
     middle = (low + high) / 2
     for name, centre, length in zip("xyz", middle, size, strict=True):
         getattr(axes, f"set_{name}lim")(centre - length / 2, centre + length / 2)

@@ -15,6 +15,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from colift.allocation import base as allocation
+from colift.allocation.base import INFO_SIZE
 from colift.attitude_control import base as attitude_control
 from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector
 from colift.load_control import base as load_control
@@ -133,9 +134,9 @@ def advance(  # type: ignore[no-untyped-def]
             end = monotonic_ns()
             row = k // every.allocation
             cycles[row, 0] = status
-            for m in range(5):
+            for m in range(INFO_SIZE):
                 cycles[row, 1 + m] = info[m]
-            cycles[row, 6] = (end - begin) * 1e-9
+            cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9
             if status != 0:
                 failures += 1
 

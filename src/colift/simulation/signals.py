@@ -65,6 +65,14 @@ CYCLE_SIGNALS = (
     Signal("allocator_objective", (), "N^2", "J", "-", "objective of each allocation"),
     Signal("allocator_optimality_gap", (), "N^2", "-", "-", "objective less the global optimum"),
     Signal("allocator_force_residual", (), "N", "-", "-", "error of the force balance"),
+    Signal(
+        "allocator_active_limits",
+        (),
+        "1",
+        "-",
+        "-",
+        "bits of the limits at work; 0 without limits",
+    ),
     Signal("allocator_time", (), "s", "-", "-", "measured duration of each allocation"),
 )
 """Recorded once per allocation, in this order."""
