@@ -46,7 +46,7 @@ def set_up(lock: str) -> None:
     if stamp.is_file() and stamp.read_text() == key:
         return
     print(f"Setting up {ENVIRONMENT} from {lock} (once; a few minutes at most)", file=sys.stderr)
-    if not (BIN / "python").exists() and not (BIN / "python.exe").exists():
+    if not any((BIN / name).exists() for name in ("pip", "pip.exe")):  # or left half made
         venv.create(ENVIRONMENT, with_pip=True)
     pip = [str(BIN / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     execute([*pip, "--require-hashes", "--requirement", str(requirements)])

@@ -158,3 +158,27 @@ def test_an_allocator_in_a_file_of_ones_own_flies(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["compiled"] is False
+
+
+def test_two_flights_of_one_second_do_not_share_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from colift.cli import new_folder
+
+    monkeypatch.chdir(tmp_path)
+    assert len({new_folder("hover") for _ in range(20)}) == 20
+
+
+@pytest.mark.parametrize("arguments", [("run", *SHORT), ("bench", "--quick", "--sizes", "4")])
+def test_a_result_that_cannot_be_written_is_one_message(
+    tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    (tmp_path / "file").touch()
+    done = colift(*arguments, "--out", str(tmp_path / "file/x"))
+    assert done.returncode == 1
+    assert done.stderr.startswith("error:")
+    assert "Traceback" not in done.stderr
+
+
+def test_help_names_the_default_folder() -> None:
+    assert "runs/MISSION-DATE-TIME" in colift("run", "--help").stdout

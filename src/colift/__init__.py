@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from colift.allocation.base import Allocation, Allocator, Status
+    from colift.allocation.safe import SafeAllocator
     from colift.allocation.sqp import SqpAllocator
     from colift.errors import ColiftError, MissionError
     from colift.mission import Mission, load_mission
@@ -23,6 +24,7 @@ _HOMES = {
     "MissionError": "colift.errors",
     "Recording": "colift.recording",
     "Run": "colift.runner",
+    "SafeAllocator": "colift.allocation.safe",
     "SqpAllocator": "colift.allocation.sqp",
     "Status": "colift.allocation.base",
     "Team": "colift.team",
@@ -38,6 +40,7 @@ __all__ = [
     "MissionError",
     "Recording",
     "Run",
+    "SafeAllocator",
     "SqpAllocator",
     "Status",
     "Team",

@@ -61,7 +61,8 @@ def run(
     sets: Sets = None,
     seed: Annotated[int | None, typer.Option(help="Seed instead of the mission's.")] = None,
     folder: Annotated[
-        Path | None, typer.Option("--out", help="Result folder [default: runs/MISSION-DATE-TIME].")
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/MISSION-DATE-TIME"),
     ] = None,
     extra: With = None,
     report: Annotated[bool, typer.Option(help="Write the HTML report and its figures.")] = True,
@@ -90,7 +91,7 @@ def run(
         )
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
-    target = folder or Path("runs") / f"{_slug(loaded.name)}-{datetime.now():%Y%m%d-%H%M%S}"
+    target = folder or new_folder(loaded.name)
     files = write_results(flown, target, report=report)
     if as_json:
         emit(
@@ -129,7 +130,10 @@ def run(
 
 @app.command()
 def reproduce(
-    folder: Annotated[Path | None, typer.Option("--out", help="Result folder.")] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/reproduce-DATE-TIME"),
+    ] = None,
     report: Annotated[bool, typer.Option(help="Write the HTML page and its figures.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -142,7 +146,7 @@ def reproduce(
         from colift import reproduction
     with progress("Reproducing the paper") as advance:
         result = reproduction.reproduce(advance)
-    target = folder or Path("runs") / f"reproduce-{datetime.now():%Y%m%d-%H%M%S}"
+    target = folder or new_folder("reproduce")
     files = reproduction.write(result, target, report=report)
     if as_json:
         emit({**result.as_dict(), "files": {name: str(path) for name, path in files.items()}})
@@ -289,6 +293,20 @@ def progress(title: str) -> Iterator[Report]:
         yield lambda fraction: bar.update(task, completed=fraction)
 
 
+def new_folder(name: str) -> Path:
+    """Make ``runs/NAME-DATE-TIME``, numbered where flights of the same second would share it."""
+    stem = f"{_slug(name)}-{datetime.now():%Y%m%d-%H%M%S}"
+    folder, number = Path("runs") / stem, 1
+    folder.parent.mkdir(exist_ok=True)
+    while True:
+        try:
+            folder.mkdir()
+            return folder
+        except FileExistsError:
+            number += 1
+            folder = folder.with_name(f"{stem}-{number}")
+
+
 def _slug(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)[:60]
 
@@ -301,6 +319,11 @@ def main() -> None:
         err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(EXIT_USAGE)
     except ColiftError as error:
+        err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
+        sys.exit(EXIT_ERROR)
+    except OSError as error:
+        if error.filename is None:
+            raise
         err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(EXIT_ERROR)
     except KeyboardInterrupt:

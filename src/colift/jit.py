@@ -8,8 +8,11 @@ first-class functions and still be cached between processes.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
+import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -85,16 +88,36 @@ def cache_folder(folder: Path) -> Path:
     for source in sorted(sources):
         digest.update(source.read_bytes())
     home = os.environ.get("COLIFT_CACHE") or config.CACHE_DIR
-    if not home:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        home = Path(base) / "colift"
-    target = Path(home) / f"{folder.name}-{digest.hexdigest()[:16]}"
+    name = f"{folder.name}-{digest.hexdigest()[:16]}"
     try:
+        if not home:
+            base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+            home = Path(base) / "colift"
+        target = Path(home) / name
         target.mkdir(parents=True, exist_ok=True)
-    except OSError:  # no writable home: cache for this boot at least
-        target = Path(tempfile.gettempdir()) / "colift" / target.name
-        target.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # no home, or none to write to: cache for this boot at least
+        target = _temporary_folder() / name
+        target.mkdir(exist_ok=True)
     return target
+
+
+@cache
+def _temporary_folder() -> Path:
+    """A cache under the common temporary folder that only this user can reach: it holds code.
+
+    If somebody else took the name, a folder that is gone with this process.
+    """
+    folder = Path(tempfile.gettempdir()) / f"colift-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        if found.st_uid == os.getuid() and stat.S_IMODE(found.st_mode) == 0o700:
+            return folder
+    except OSError:
+        pass
+    folder = Path(tempfile.mkdtemp(prefix="colift-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def monotonic_ns() -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.allocation.base import Status
 from colift.geometry import pairwise_angles
 from colift.recording import Recording
 
@@ -23,6 +24,8 @@ class Metric:
 
 
 _METRICS: list[Metric] = []
+
+_WITHIN_LIMITS = (int(Status.FORCE_REDUCED), int(Status.RECOVERING))
 
 
 def _metric(unit: str, meaning: str) -> Callable[[Callable[[Recording], float]], None]:
@@ -130,9 +133,16 @@ def slack_time_s(r: Recording) -> float:
     return float(np.nanmax(r["slack_times"], axis=0).sum())
 
 
-@_metric("1", "allocations that ended with a status other than ok")
+@_metric("1", "allocations that failed: not the best answer, and no limit to blame")
 def allocator_failures(r: Recording) -> float:
-    return float(np.count_nonzero(r["allocator_status"]))
+    return float(np.count_nonzero(~np.isin(r["allocator_status"], [0, *_WITHIN_LIMITS])))
+
+
+@_metric(
+    "1", "allocations whose force had to give way to a limit, or that were regaining the limits"
+)
+def allocator_limited(r: Recording) -> float:
+    return float(np.count_nonzero(np.isin(r["allocator_status"], _WITHIN_LIMITS)))
 
 
 @_metric("1", "mean iterations of an allocation")

@@ -97,6 +97,8 @@ class Allocation:
         Objective minus the closed-form global optimum, N^2; NaN where no certificate applies.
     force_residual : float
         ``|sum T_i alpha_i + F|``, N.
+    active_limits : int
+        Bits of the limits at work, as the allocator names them; 0 for one without limits.
     solve_time : float
         s, of the kernel call.
 
@@ -137,6 +139,10 @@ class Allocation:
     @property
     def force_residual(self) -> float:
         return float(self._info[INFO_BALANCE])
+
+    @property
+    def active_limits(self) -> int:
+        return int(self._info[INFO_ACTIVE])
 
     def __repr__(self) -> str:
         return (

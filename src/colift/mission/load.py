@@ -23,7 +23,7 @@ from colift.simulation.signals import columns
 
 DEFAULT_KINDS = {
     "load_control": "pid",
-    "allocation": "sqp",
+    "allocation": "safe",
     "position_control": "pid",
     "attitude_control": "manifold",
     "plant": "rigid-cables",

@@ -53,7 +53,11 @@ details{border:1px solid var(--rule);border-radius:.4rem;background:var(--card);
 margin:.6rem 0}
 summary{cursor:pointer;font-weight:600}
 pre{overflow-x:auto;margin:.7rem 0 .2rem}
-@media (max-width:40rem){body{padding:1.2rem .9rem 3rem}h1{font-size:1.4rem}}
+@media (max-width:40rem){body{padding:1.2rem .9rem 3rem}h1{font-size:1.4rem}
+.many thead{display:none}.many tr{display:grid;grid-template-columns:1fr 1fr;padding:.5rem 0;
+border-bottom:1px solid var(--rule)}.many td{border:0;padding:.1rem 0;text-align:left;min-width:0}
+.many td:first-child,.many td:last-child{grid-column:1/-1}.many td:first-child{font-weight:600}
+.many .number::before{content:attr(data-name) " ";color:var(--soft)}}
 @media print{body{max-width:none}figure{break-inside:avoid}}
 """
 
@@ -69,14 +73,19 @@ def page(title: str, body: str) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """A table; ``header`` is text, cells are HTML; columns listed in ``numbers`` align right."""
+    """A table; ``header`` is text, cells are HTML; columns listed in ``numbers`` align right.
+
+    On a narrow screen the cells of a row of more than three columns stand below each other.
+    """
     look = ['class="number"' if k in numbers else "" for k in range(len(header))]
+    cells = [f'{c} data-name="{escape(t)}"' if c else c for c, t in zip(look, header, strict=True)]
     head = "".join(f"<th {c}>{escape(t)}</th>" for c, t in zip(look, header, strict=True))
     body = "\n".join(
-        "<tr>" + "".join(f"<td {c}>{t}</td>" for c, t in zip(look, row, strict=True)) + "</tr>"
+        "<tr>" + "".join(f"<td {c}>{t}</td>" for c, t in zip(cells, row, strict=True)) + "</tr>"
         for row in rows
     )
-    text = f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
+    kind = ' class="many"' if len(header) > 3 else ""
+    text = f"<table{kind}>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
     return f'<div class="scroll">{text}</div>'.replace("<th >", "<th>").replace("<td >", "<td>")
 
 

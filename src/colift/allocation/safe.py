@@ -1,0 +1,449 @@
+"""The safe allocator: the paper's cost under hard limits on cables, pairs and drones."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from colift.allocation import _feasibility as feasible
+from colift.allocation import _safe_cycle as cycle
+from colift.allocation import _safe_newton as newton
+from colift.allocation import _sqp_newton as paper
+from colift.allocation.base import (
+    INFO_ACTIVE,
+    INFO_BALANCE,
+    INFO_GAP,
+    INFO_OBJECTIVE,
+    INFO_RESIDUAL,
+    SIGNATURE,
+    Allocator,
+    AllocatorPart,
+    Status,
+)
+from colift.geometry import pairwise_angles, ring
+from colift.jit import kernel
+from colift.part import Vector
+from colift.team import Team
+
+_CONVERGED = int(Status.CONVERGED)
+_ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
+_INVALID_FORCE = int(Status.INVALID_FORCE)
+_FORCE_REDUCED = int(Status.FORCE_REDUCED)
+_RECOVERING = int(Status.RECOVERING)
+"""Where ``info`` has a sixth place: which kinds of limits push, one bit each in the order of
+:mod:`colift.allocation._safe_newton`; 64 stands for the pairs."""
+
+
+@kernel(SIGNATURE)
+def _allocate(force, acceleration, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+    n = tensions.shape[0]
+    most = n * (n - 1) // 2
+    count = newton.LIMITS * n + most
+    o = 0
+    data = memory[o : o + newton.DATA * n]
+    o += newton.DATA * n
+    T = memory[o : o + n]
+    o += n
+    alpha = memory[o : o + 3 * n]
+    o += 3 * n
+    start = memory[o : o + 3 * n]
+    o += 3 * n
+    w = memory[o : o + 3 * n]
+    o += 3 * n
+    dw = memory[o : o + 3 * n]
+    o += 3 * n
+    w_new = memory[o : o + 3 * n]
+    o += 3 * n
+    g = memory[o : o + count]
+    o += count
+    g_new = memory[o : o + count]
+    o += count
+    z = memory[o : o + count]
+    o += count
+    kappa_pair = memory[o : o + most]
+    o += most
+    cos_max = memory[o : o + most]
+    o += most
+    rows = memory[o : o + newton.ROW * n]
+    o += newton.ROW * n
+    K = memory[o : o + 4 * n * n]
+    o += 4 * n * n
+    Y = memory[o : o + 2 * n * newton.RHS]
+    o += 2 * n * newton.RHS
+    S = memory[o : o + newton.SYSTEM]
+    o += newton.SYSTEM
+    lam = memory[o : o + 3]
+    M = memory[o + 3 : o + 9]
+    o += 9
+    integers = memory[o : o + 2 * n + 2 * most].view(np.int64)
+    order = integers[:n]
+    first = integers[n : 2 * n]
+    pairs = integers[2 * n :]
+
+    for k in range(info.shape[0]):
+        info[k] = 0.0
+    fx, fy, fz = force[0], force[1], force[2]
+    if not math.isfinite(fx + fy + fz):
+        info[INFO_RESIDUAL] = math.nan
+        info[INFO_GAP] = math.nan
+        info[INFO_OBJECTIVE] = math.nan
+        info[INFO_BALANCE] = math.nan
+        return _INVALID_FORCE
+    sigma = params[cycle.SIGMA]
+    unit = 1.0 / sigma
+    # More than all cables can give changes nothing but the numbers' size.
+    most_force = 2.0 * params[cycle.TOTAL]
+    fx = min(max(fx, -most_force), most_force) * unit
+    fy = min(max(fy, -most_force), most_force) * unit
+    fz = min(max(fz, -most_force), most_force) * unit
+    W = math.sqrt(fx * fx + fy * fy + fz * fz)
+    mu = params[cycle.MU] * unit * unit
+    if params[cycle.MU_SCALED] != 0.0:
+        mu *= (W * sigma / params[cycle.MU_FORCE]) ** 2
+    period = dt if dt > 1e-6 else 1e-6
+    delta = min(params[cycle.MAX_RATE] * period, cycle.MAX_TURN)
+    rho = params[cycle.SETTLING] / period
+
+    cycle.sort_cables(n, directions, order)
+    relaxed = cycle.set_up(
+        n,
+        order,
+        W,
+        unit,
+        delta,
+        acceleration,
+        tensions,
+        directions,
+        params,
+        data,
+        T,
+        start,
+        alpha,
+        w,
+    )
+    m = cycle.near_pairs(
+        n,
+        params[cycle.MIN_ANGLE],
+        max(params[cycle.REACH], 2.0 * delta),
+        params[cycle.KAPPA_PAIR],
+        start,
+        alpha,
+        pairs,
+        first,
+        kappa_pair,
+        cos_max,
+    )
+    heavy = max(1.0, abs(fz) / n)
+    outcome = cycle.iterate(
+        n,
+        int(params[cycle.LIMITS]),
+        m,
+        fx,
+        fy,
+        fz,
+        mu,
+        rho,
+        params[cycle.KAPPA],
+        0.5 * params[cycle.KAPPA_RATE] * max(rho, 1.0) * delta * delta,
+        params[cycle.BOUND_H] * heavy,
+        params[cycle.BOUND_V] * heavy,
+        params[cycle.TOLERANCE],
+        int(params[cycle.ITERATIONS]),
+        pairs,
+        first,
+        kappa_pair,
+        cos_max,
+        data,
+        T,
+        alpha,
+        w,
+        dw,
+        w_new,
+        g,
+        g_new,
+        z,
+        rows,
+        K,
+        Y,
+        S,
+        lam,
+        M,
+        info,
+    )
+    info[INFO_ACTIVE] = cycle.active_limits(n, int(params[cycle.LIMITS]), m, z)
+    squares = M[0] * M[0] + M[3] * M[3] + M[5] * M[5]
+    squares += 2.0 * (M[1] * M[1] + M[2] * M[2] + M[4] * M[4])
+    J = 0.5 * mu * (squares - n)
+    rx, ry, rz = force[0], force[1], force[2]
+    for i in range(n):
+        at = order[i]
+        J += 0.5 * data[newton.DATA * i + newton.OMEGA] * T[i] * T[i]
+        tensions[at] = T[i] * sigma
+        for k in range(3):
+            directions[at, k] = alpha[3 * i + k]
+        rx += tensions[at] * directions[at, 0]
+        ry += tensions[at] * directions[at, 1]
+        rz += tensions[at] * directions[at, 2]
+    balance = math.sqrt(rx * rx + ry * ry + rz * rz)
+    info[INFO_BALANCE] = balance
+    info[INFO_OBJECTIVE] = J * sigma * sigma
+    info[INFO_GAP] = math.nan
+    if W > 1e-6 and mu > 0.0 and params[cycle.EQUAL] != 0.0:
+        info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
+    if relaxed:
+        return _RECOVERING
+    if balance > 1e-8 * max(1.0, sigma):
+        return _FORCE_REDUCED
+    if outcome == cycle.CONVERGED:
+        return _CONVERGED
+    return _ITERATION_LIMIT
+
+
+Degrees = Annotated[float, Field(gt=0.0, lt=90.0)]
+Force = Annotated[float, Field(gt=0.0, le=1e6)]
+
+RATE_BARRIER = 1.0
+"""Barrier of the rate limit, relative to the proximal term at the limit: a smoother of its own."""
+GIVE_WAY = 20.0
+"""Price of horizontal force, in shares of the load per cable, at which the force gives way."""
+VERTICAL_FIRST = 20.0
+"""How much dearer vertical force is than horizontal force."""
+
+
+class Safe(AllocatorPart):
+    """The paper's cost under hard limits on cables, pairs of cables and drones.
+
+    The limits hold in every answer. Where they do not allow the whole force, the force gives way, its
+    horizontal part first. Which member of the paper's flat family of optima is chosen, and kept, is
+    decided by the barrier of the pairs (``spread``) and a proximal term (``settling``).
+    """
+
+    kernel = _allocate
+
+    mu: Annotated[float, Field(ge=0.0)] = 0.15
+    """Weight of the alignment penalty, N^2."""
+    mu_scaling: Literal["absolute", "weight"] = "absolute"
+    """``weight``: mu grows with the square of the force, so that a heavier load does not draw the
+    cables together; ``mu`` is meant for ``mu_force``."""
+    mu_force: Force = 2.20725
+    """Force for which ``mu`` is meant when it is scaled, N (default: weight of the paper's load)."""
+    min_angle_deg: Annotated[float, Field(gt=0.0, lt=150.0)] = 30.0
+    """Least angle between any two cables, degrees."""
+    tension_min: Force | list[Force] = 0.05
+    """Least tension, N; one value, or one per cable."""
+    tension_max: Force | list[Force] = 5.0
+    """Largest tension, N; one value, or one per cable."""
+    max_cone_deg: Degrees = 75.0
+    """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
+    max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 6.0
+    """Fastest turn of a cable's direction, rad/s."""
+    max_thrust: Force | list[Force] | None = None
+    """Largest thrust of a drone, N; none: not limited."""
+    max_tilt_deg: Degrees | None = None
+    """Largest angle between a drone's thrust and the vertical, degrees; none: not limited."""
+    weights: Annotated[float, Field(gt=0.0)] | list[Annotated[float, Field(gt=0.0)]] = 1.0
+    """Weight of each cable's squared tension, such as the inverse of a battery's charge."""
+    settling: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
+    """Time with which directions settle at the optimum, s; tensions follow at once."""
+    spread: Annotated[float, Field(ge=1e-6, le=1.0)] = 1e-2
+    """Barrier between near cables, in squared shares of the load; more spreads them wider."""
+    barrier: Annotated[float, Field(ge=1e-8, le=0.1)] = 1e-3
+    """Barrier of all other limits, in squared shares of the load."""
+    tolerance: Annotated[float, Field(ge=1e-10, le=1e-3)] = 1e-6
+    """KKT residual, in shares of the load, at which the iteration stops."""
+    max_iterations: Annotated[int, Field(ge=2, le=200)] = 30
+    """Most interior-point steps in one call."""
+
+    @model_validator(mode="after")
+    def _ranges(self) -> Safe:
+        low = np.atleast_1d(np.asarray(self.tension_min, dtype=float))
+        high = np.atleast_1d(np.asarray(self.tension_max, dtype=float))
+        comparable = 1 in (low.size, high.size) or low.size == high.size
+        if comparable and np.any(1.2 * low > high):
+            raise ValueError(
+                f"tension_min = {self.tension_min} conflicts with tension_max = {self.tension_max}: "
+                "each cable needs tension_max of at least 1.2 tension_min"
+            )
+        return self
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        problems = [
+            (name, f"{len(value)} values; must be one value or one for each of {team.n} drones")
+            for name in ("tension_min", "tension_max", "max_thrust", "weights")
+            if isinstance(value := getattr(self, name), list) and len(value) != team.n
+        ]
+        if problems:
+            return problems
+        if self.max_thrust is not None:
+            own = team.masses * team.gravity
+            weak = np.flatnonzero(0.8 * np.broadcast_to(self.max_thrust, team.n) < own)
+            if weak.size:
+                i = int(weak[0])
+                problems.append(
+                    (
+                        "max_thrust",
+                        f"max_thrust = {self.max_thrust} conflicts with drones.mass: drone {i} alone "
+                        f"weighs {own[i]:.4g} N and needs a quarter more to fly",
+                    )
+                )
+        return problems + feasible.conflicts_of(team, self)
+
+    def without(self, drone: int) -> Safe:
+        lists = {
+            name: [*value[:drone], *value[drone + 1 :]]
+            for name in ("tension_min", "tension_max", "max_thrust", "weights")
+            if isinstance(value := getattr(self, name), list)
+        }
+        return self.model_copy(update=lists)
+
+    def tension_caps(self, n: int) -> Vector:
+        """Largest tension of each cable (n,), N."""
+        return np.array(np.broadcast_to(np.asarray(self.tension_max, dtype=float), n))
+
+    def tension_floors(self, n: int) -> Vector:
+        """Least tension of each cable (n,), N."""
+        return np.array(np.broadcast_to(np.asarray(self.tension_min, dtype=float), n))
+
+    def params(self, team: Team) -> Vector:
+        n = team.n
+        limited = self.max_thrust is not None or self.max_tilt_deg is not None
+        head = np.zeros(cycle.HEAD)
+        head[cycle.MU] = self.mu
+        head[cycle.MU_SCALED] = self.mu_scaling == "weight"
+        head[cycle.MU_FORCE] = self.mu_force
+        head[cycle.SIGMA] = max(team.load_mass * max(team.gravity, 1e-3) / n, 1e-6)
+        head[cycle.KAPPA] = self.barrier
+        head[cycle.KAPPA_RATE] = RATE_BARRIER
+        head[cycle.KAPPA_PAIR] = self.spread
+        head[cycle.MIN_ANGLE] = math.radians(self.min_angle_deg)
+        head[cycle.REACH] = self._reach(n)
+        head[cycle.MAX_RATE] = self.max_rate
+        head[cycle.SETTLING] = self.settling
+        head[cycle.BOUND_H] = GIVE_WAY
+        head[cycle.BOUND_V] = GIVE_WAY * VERTICAL_FIRST
+        head[cycle.TOLERANCE] = self.tolerance
+        head[cycle.ITERATIONS] = self.max_iterations
+        head[cycle.LIMITS] = newton.LIMITS if limited else newton.TILT - 1
+        head[cycle.GRAVITY] = team.gravity
+        head[cycle.CONE] = math.radians(self.max_cone_deg)
+        head[cycle.TILT] = math.radians(self.max_tilt_deg or 89.0)
+        head[cycle.TOTAL] = float(np.sum(self.tension_caps(n)))
+        weights = np.broadcast_to(np.asarray(self.weights, dtype=float), n)
+        head[cycle.EQUAL] = bool(np.all(weights == 1.0))
+        cables = np.empty((n, cycle.PER_CABLE))
+        cables[:, 0] = weights
+        cables[:, 1] = self.tension_floors(n)
+        cables[:, 2] = self.tension_caps(n)
+        cables[:, 3] = team.masses
+        cables[:, 4] = 1e6 if self.max_thrust is None else self.max_thrust
+        return np.concatenate([head, cables.ravel()])
+
+    def _reach(self, n: int) -> float:
+        """Distance beyond the least angle at which a pair is seen, rad: about the second neighbours."""
+        cone, least = math.radians(self.max_cone_deg), math.radians(self.min_angle_deg)
+        spacing = math.sqrt(1.15 * 2.0 * math.pi * (1.0 - math.cos(cone)) / n)
+        return min(max(1.8 * spacing - least, 0.3 * least), math.radians(60.0))
+
+    def memory(self, team: Team) -> Vector:
+        n = team.n
+        pairs = n * (n - 1) // 2
+        limits = newton.LIMITS * n + pairs
+        cables = newton.DATA + 16 + newton.ROW + 2 * newton.RHS + 2  # 2: order, first
+        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 9)
+
+    def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
+        gram = directions @ directions.T
+        pairs = 0.5 * (np.sum(gram * gram) - len(tensions))
+        mu = self.mu
+        if self.mu_scaling == "weight":
+            mu *= float(np.sum((tensions @ directions) ** 2)) / self.mu_force**2
+        return float(0.5 * np.sum(self.weights * tensions**2) + mu * pairs)
+
+
+class SafeAllocator(Allocator):
+    """The safe allocator, called by hand; see :class:`Safe` for the settings.
+
+    Raises
+    ------
+    ValueError
+        For limits that cannot hold together, both by name.
+
+    Examples
+    --------
+    >>> allocator = SafeAllocator(n=4, mu=0.15, min_angle_deg=30, tension_min=0.05)
+    >>> allocator.allocate([0.0, 0.0, 2.2]).status.ok
+    True
+
+    """
+
+    part: Safe
+
+    def __init__(
+        self,
+        n: int | Team = 4,
+        mu: float = 0.15,
+        min_angle_deg: float = 30.0,
+        tension_min: float | list[float] = 0.05,
+        tension_max: float | list[float] = 5.0,
+        max_cone_deg: float = 75.0,
+        *,
+        cone_deg: float = 35.0,
+        dt: float = 0.01,
+        **settings: Any,
+    ) -> None:
+        part = Safe(
+            mu=mu,
+            min_angle_deg=min_angle_deg,
+            tension_min=tension_min,
+            tension_max=tension_max,
+            max_cone_deg=max_cone_deg,
+            **settings,
+        )
+        if isinstance(n, Team) or n >= 1:
+            problems = part.check(n if isinstance(n, Team) else Team.uniform(n))
+            if problems:
+                raise ValueError("; ".join(f"{name}: {message}" for name, message in problems))
+        super().__init__(part, n, cone_deg=cone_deg, dt=dt)
+
+    @classmethod
+    def unchecked(cls, team: Team, part: Safe) -> SafeAllocator:
+        """An allocator for limits that may conflict: the least violation is what is wanted."""
+        allocator = cls.__new__(cls)
+        Allocator.__init__(allocator, part, team)
+        return allocator
+
+    @property
+    def mu(self) -> float:
+        """Weight of the alignment penalty, N^2; may be changed between two calls."""
+        return self.part.mu
+
+    @mu.setter
+    def mu(self, value: float) -> None:
+        self.update(mu=value)
+
+    def reset(self, directions: ArrayLike | None = None, tensions: ArrayLike | None = None) -> None:
+        """Forget the last answer and start from the given one, or from a formation within the limits.
+
+        The default is the ring of ``cone_deg``, or a wider formation where the ring is too narrow.
+        """
+        if directions is None:
+            directions = self._default()
+        super().reset(directions, tensions)
+
+    def _default(self) -> Vector:
+        cone, most = self._cone, math.radians(self.part.max_cone_deg)
+        enough = math.radians(self.part.min_angle_deg + 1.0)
+        default = ring(self.n, min(cone, 0.95 * most))
+        if self.n == 1 or float(pairwise_angles(default).min()) >= enough:
+            return default
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            candidate, angle = feasible.widest_formation(
+                self.n, cone + share * (0.98 * most - cone), enough=enough
+            )
+            if angle >= enough:
+                break
+        return candidate
