@@ -46,8 +46,10 @@ def set_up(lock: str) -> None:
     if stamp.is_file() and stamp.read_text() == key:
         return
     print(f"Setting up {ENVIRONMENT} from {lock} (once; a few minutes at most)", file=sys.stderr)
-    if not any((BIN / name).exists() for name in ("pip", "pip.exe")):  # or left half made
+    if not (BIN / "python").exists() and not (BIN / "python.exe").exists():
         venv.create(ENVIRONMENT, with_pip=True)
+    elif not any(BIN.glob("pip*")):  # interrupted while it was made, or made by a tool without pip
+        execute([str(BIN / "python"), "-m", "ensurepip", "--default-pip"])
     pip = [str(BIN / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     execute([*pip, "--require-hashes", "--requirement", str(requirements)])
     execute([*pip, "--no-deps", "--editable", str(ROOT)])
@@ -56,7 +58,7 @@ def set_up(lock: str) -> None:
 
 def execute(command: list[str]) -> None:
     """Run a command; end with its exit code if it fails."""
-    code = subprocess.call(command, cwd=ROOT, stdout=sys.stderr if "pip" in command else None)
+    code = subprocess.call(command, cwd=ROOT, stdout=sys.stderr if {"pip", "ensurepip"} & {*command} else None)
     if code:
         sys.exit(code)
 

@@ -180,7 +180,7 @@ TABLE = [
     ({"allocation.mu": "0.3"}, ["allocation.mu: must be a number"]),
     ({"allocation.max_iterations": 0}, ["allocation.max_iterations: must be greater than or"]),
     ({"allocation.max_iterations": 2.5}, ["allocation.max_iterations: must be a whole number"]),
-    ({"allocation.transport": "yes"}, ["allocation.transport: must be true or false"]),
+    ({"position_control.direction_rates": "yes"}, ["position_control.direction_rates: must be true or false"]),
     ({"allocation": {"kind": "ring", "mu": 0.3}}, ["allocation.mu: unknown key", "cone_deg"]),
     ({"allocation": {"kind": "ring", "cone_deg": 90}}, ["allocation.cone_deg: must be less than 90"]),
     # events
@@ -420,10 +420,10 @@ def test_overrides_replace_and_leave_the_source_alone():
 
 
 def test_another_kind_drops_the_settings_of_the_old_one():
-    for section in ({"kind": "sqp", "mu": 0.4}, {"mu": 0.4}):  # sqp is the default kind
+    for section in ({"kind": "sqp", "mu": 0.4}, {"mu": 0.4}):  # safe is the default kind
         mission = load_mission({**base(), "allocation": section}, {"allocation.kind": "ring"})
         assert mission.kinds["allocation"] == "ring"
-    same = load_mission({**base(), "allocation": {"mu": 0.4}}, {"allocation.kind": "sqp"})
+    same = load_mission({**base(), "allocation": {"mu": 0.4}}, {"allocation.kind": "safe"})
     assert same.allocation.mu == 0.4
 
 

@@ -249,7 +249,13 @@ def test_start_directions_of_any_length():
 
 def test_without_gravity_and_weightless_cables_nothing_breaks():
     r = fly(
-        "hover", **{"world.gravity": 0.0, "timing.duration": 0.2, "start.load_offset": [0.0] * 3}
+        "hover",
+        **{
+            "world.gravity": 0.0,
+            "timing.duration": 0.2,
+            "start.load_offset": [0.0] * 3,
+            "allocation.kind": "sqp",
+        },
     )
     assert all(np.isfinite(r[s.name]).all() for s in SIGNALS)
 

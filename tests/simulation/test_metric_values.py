@@ -33,7 +33,7 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["desired_directions"][:] = ring(n, np.radians(30.0))
     arrays["slack_times"][-1] = 0.5
     cycles = {s.name: np.zeros(101) for s in CYCLE_SIGNALS}
-    cycles["allocator_status"][[3, 70]] = [1.0, 4.0]
+    cycles["allocator_status"][[3, 70, 90]] = [1.0, 4.0, 6.0]
     cycles["allocator_iterations"][:] = 2.0
     cycles["allocator_iterations"][5] = 12.0
     cycles["allocator_time"][:] = np.arange(101) * 1e-6
@@ -61,6 +61,7 @@ EXPECTED = {
     "tension_imbalance": 4.0,
     "slack_time_s": 2.0,
     "allocator_failures": 2.0,
+    "allocator_limited": 1.0,
     "allocator_mean_iterations": 2.0 + 10.0 / 101.0,
     "allocator_max_iterations": 12.0,
     "allocator_mean_us": 50.0,
