@@ -58,7 +58,9 @@ def set_up(lock: str) -> None:
 
 def execute(command: list[str]) -> None:
     """Run a command; end with its exit code if it fails."""
-    code = subprocess.call(command, cwd=ROOT, stdout=sys.stderr if {"pip", "ensurepip"} & {*command} else None)
+    code = subprocess.call(
+        command, cwd=ROOT, stdout=sys.stderr if {"pip", "ensurepip"} & {*command} else None
+    )
     if code:
         sys.exit(code)
 

@@ -182,3 +182,35 @@ def test_a_result_that_cannot_be_written_is_one_message(
 
 def test_help_names_the_default_folder() -> None:
     assert "runs/MISSION-DATE-TIME" in colift("run", "--help").stdout
+
+
+def test_the_version_and_a_summary_in_words(tmp_path: Path) -> None:
+    assert colift("--version").stdout.startswith("colift 0.")
+    done = colift("run", "hover", *SHORT, "--json", "--out", str(tmp_path))
+    assert "no slack" in json.loads(done.stdout)["summary"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = (", "SyntaxError"),
+        ("import nowhere_at_all", "nowhere_at_all"),
+        ("x = 1", "holds no class"),
+        (
+            "from colift.jit import kernel, void, f8\n"
+            "from colift.allocation.base import AllocatorPart\n"
+            "@kernel(void(f8))\ndef share(x):\n    pass\n"
+            "class Wrong(AllocatorPart):\n    kernel = share\n",
+            "signature",
+        ),
+    ],
+)
+def test_a_broken_part_of_ones_own_is_explained(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "mine.py").write_text(text)
+    done = colift(
+        "run", "hover", "--with", "mine.py", "--set", "allocation.kind=mine", "--no-report",
+        folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert says in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,9 @@ from colift.report import comparison, figures, html, panels, render, style
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:
     """Two seconds of a mission at the coarse recording rate that figures need."""
-    events = {"events": []} if mission == "payload-step" else {}
-    overrides = {"timing.duration": 2.0, **events, **settings}
+    events = load_mission(mission).events
+    early = [event.model_dump() | {"at": 1.0 + 0.1 * k} for k, event in enumerate(events)]
+    overrides = {"timing.duration": 2.0, "events": early, **settings}
     return colift.run(mission, overrides=overrides).recording
 
 
@@ -140,7 +142,10 @@ def test_text_of_a_mission_is_escaped() -> None:
 
 def test_mission_in_the_page_is_a_valid_mission_file() -> None:
     mission = load_mission("payload-step", {"name": 'quotes " and \\ and é', "seed": 3})
-    assert tomllib.loads(html.toml(mission.resolved())) == mission.resolved()
+    recording = replace(fly(**{"timing.duration": 0.1}), mission=mission)
+    page = html.report(recording, {}, [])
+    text = unescape(page.split("<pre>")[1].split("</pre>")[0])
+    assert tomllib.loads(text) == mission.resolved()
 
 
 def test_large_svg_is_shown_as_bitmap(spiral: Recording) -> None:
@@ -153,8 +158,8 @@ def test_large_svg_is_shown_as_bitmap(spiral: Recording) -> None:
 
 def test_verdict_names_what_is_wrong(spiral: Recording) -> None:
     good = metrics.compute(spiral)
-    assert html.verdict(spiral, good)[0] == "good"
-    level, words = html.verdict(spiral, {**good, "slack_time_s": 0.5, "min_angle_deg": 12.0})
+    assert metrics.verdict(spiral, good)[0] == "good"
+    level, words = metrics.verdict(spiral, {**good, "slack_time_s": 0.5, "min_angle_deg": 12.0})
     assert level == "warn"
     assert "slack cables for 0.5 s" in words
     assert "smallest angle 12.0 deg, below 30 deg" in words

@@ -53,6 +53,23 @@ With = Annotated[
 ]
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"colift {version('colift')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Several multirotors carry one load on cables: allocate, control, simulate, judge."""
+
+
 @app.command()
 def run(
     mission: Annotated[
@@ -98,6 +115,7 @@ def run(
             {
                 "mission": loaded.name,
                 "outcome": flown.recording.outcome,
+                "summary": metrics.verdict(flown.recording, flown.metrics)[1],
                 "metrics": flown.metrics,
                 "loop_time_s": flown.loop_time,
                 "compiled": flown.compiled,
@@ -116,6 +134,9 @@ def run(
             value = f"{flown.metrics[metric.name]:.5g}"
             table.add_row(metric.name, value, metric.unit, metric.meaning)
         out.print(table)
+        level, sentence = metrics.verdict(flown.recording, flown.metrics)
+        colour = {"good": "green", "warn": "yellow", "bad": "red"}[level]
+        out.print(f"[{colour}]{escape(sentence)}[/{colour}]")
         simulated = loaded.timing.duration
         how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
         out.print(

@@ -47,14 +47,5 @@ class MissionError(ColiftError):
         super().__init__(f"{source}: {count}\n{lines}")
 
 
-class MissingExtraError(ColiftError):
-    """An optional dependency is needed and not installed."""
-
-    def __init__(self, package: str, extra: str) -> None:
-        super().__init__(
-            f"this needs the package {package!r}; install it with: pip install 'colift[{extra}]'"
-        )
-
-
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,9 @@ class Metric:
     meaning: str
     compute: Callable[[Recording], float]
 
+
+SAFE_ANGLE = 30.0
+"""Angle between cables below which the paper calls a formation unsafe, degrees."""
 
 _METRICS: list[Metric] = []
 
@@ -43,6 +47,35 @@ def all_metrics() -> tuple[Metric, ...]:
 def compute(recording: Recording) -> dict[str, float]:
     """All metrics of a recording by name; NaN where one does not apply."""
     return {metric.name: float(metric.compute(recording)) for metric in _METRICS}
+
+
+def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str]:
+    """How the flight went, as a level (good, warn or bad) and a sentence."""
+    level = "good" if recording.outcome == "completed" else "bad"
+    words = [recording.outcome[:1].upper() + recording.outcome[1:]]
+    slack = values.get("slack_time_s", math.nan)
+    if slack == 0.0:
+        words.append("no slack")
+    elif slack > 0.0:
+        words.append(f"slack cables for {slack:.3g} s")
+        level = "bad" if level == "bad" else "warn"
+    angle = values.get("min_angle_deg", math.nan)
+    if angle >= SAFE_ANGLE:
+        words.append(f"smallest angle {angle:.1f} deg")
+    elif angle < SAFE_ANGLE:
+        words.append(f"smallest angle {angle:.1f} deg, below {SAFE_ANGLE:g} deg")
+        level = "bad" if level == "bad" else "warn"
+    error = values.get("tracking_max_m", math.nan)
+    if math.isfinite(error) and recording.outcome == "completed":
+        words.append(f"load within {100.0 * error:.2g} cm of its reference")
+    limited = values.get("allocator_limited", 0.0)
+    if limited > 0:
+        words.append(f"in {limited:.0f} allocations the force gave way to limits")
+    failures = values.get("allocator_failures", 0.0)
+    if failures > 0:
+        words.append(f"{failures:.0f} allocations not ok")
+        level = "bad" if level == "bad" else "warn"
+    return level, "; ".join(words) + "."
 
 
 def tracking_error(recording: Recording) -> NDArray[np.float64]:

@@ -91,10 +91,18 @@ def load_file(path: str | Path) -> list[type[Part]]:
         raise ColiftError(f"{path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[module.__name__] = module  # by this name its kernels are found in the cache
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ColiftError(f"{path}: {type(error).__name__}: {error}") from error
     parts = _parts_of(module, module.__name__)
     if not parts:
         raise ColiftError(f"{path}: holds no class that derives from a layer's base class")
+    layers = [part.layer for part in parts]
+    if len(set(layers)) < len(layers):
+        raise ColiftError(
+            f"{path}: holds more than one part of a layer; give each a file of its own"
+        )
     return [register(path.stem.replace("_", "-"), part) for part in parts]
 
 

@@ -49,7 +49,7 @@ class Status(enum.IntEnum):
     ZERO_FORCE = 2
     """The force is (almost) zero: no tension, directions kept."""
     INVALID_FORCE = 3
-    """The force is not finite: the last allocation is repeated."""
+    """The force is not finite (or its square is not): the last allocation is repeated."""
     NUMERICAL_FAILURE = 4
     """The iteration left the numbers: the last directions with a share that balances the force."""
     CLAMPED = 5

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from colift.metrics import all_metrics
+import tomli_w
+
+from colift.metrics import all_metrics, verdict
 from colift.recording import Recording, atomic_path
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
         f'<p class="soft">Parts: {escape(kinds)}. Seed {mission.seed}.</p>',
         details(
             "Mission as flown, every default filled in (a valid mission file)",
-            toml(mission.resolved()),
+            tomli_w.dumps(mission.resolved()),
         ),
         details("Versions", versions),
     ]
@@ -199,47 +199,3 @@ def quantity(value: float, unit: str) -> tuple[str, str]:
     if unit == "m" and abs(value) < 1.0:
         value, unit = 100.0 * value, "cm"
     return f"{value:.4g}", {"1": "", "us": "µs", "deg": "°"}.get(unit, unit)
-
-
-def verdict(recording: Recording, metrics: Mapping[str, float]) -> tuple[str, str]:
-    """How the flight went, as a level (good, warn or bad) and a sentence."""
-    from colift.report.panels import SAFE_ANGLE
-
-    level = "good" if recording.outcome == "completed" else "bad"
-    words = [recording.outcome[:1].upper() + recording.outcome[1:]]
-    slack = metrics.get("slack_time_s", math.nan)
-    if slack == 0.0:
-        words.append("no slack")
-    elif slack > 0.0:
-        words.append(f"slack cables for {slack:.3g} s")
-        level = "bad" if level == "bad" else "warn"
-    angle = metrics.get("min_angle_deg", math.nan)
-    if angle >= SAFE_ANGLE:
-        words.append(f"smallest angle {angle:.1f} deg")
-    elif angle < SAFE_ANGLE:
-        words.append(f"smallest angle {angle:.1f} deg, below {SAFE_ANGLE:g} deg")
-        level = "bad" if level == "bad" else "warn"
-    error = metrics.get("tracking_max_m", math.nan)
-    if math.isfinite(error) and recording.outcome == "completed":
-        words.append(f"load within {100.0 * error:.2g} cm of its reference")
-    failures = metrics.get("allocator_failures", 0.0)
-    if failures > 0:
-        words.append(f"{failures:.0f} allocations not ok")
-        level = "bad" if level == "bad" else "warn"
-    return level, "; ".join(words) + "."
-
-
-def toml(data: Mapping[str, Any], prefix: str = "") -> str:
-    """Plain data as TOML: first the values of a table, then its tables."""
-    lines, tables = [], []
-    for key, value in data.items():
-        name = key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key)
-        if isinstance(value, Mapping):
-            path = f"{prefix}{name}"
-            tables.append(f"\n[{path}]\n{toml(value, f'{path}.')}")
-        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            path = f"{prefix}{name}"
-            tables += [f"\n[[{path}]]\n{toml(row, f'{path}.')}" for row in value]
-        else:
-            lines.append(f"{name} = {json.dumps(value, ensure_ascii=False)}\n")
-    return "".join(lines + tables)

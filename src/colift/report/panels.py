@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
-from colift.metrics import tracking_error
+from colift.metrics import SAFE_ANGLE, tracking_error
 from colift.recording import Recording
 from colift.report import style
 
@@ -33,9 +33,6 @@ FREE = np.empty(0)
 
 POINTS = 1200
 """Most points of a line."""
-
-SAFE_ANGLE = 30.0
-"""The paper's safety threshold for the angle between two cables, deg."""
 
 
 def decimate(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from colift.mission.schema import Event, Mission
 from colift.part import LAYERS, Vector
 from colift.plant.base import Start
 from colift.recording import Recording
-from colift.simulation.loop import CYCLE_WIDTH, Periods, Vectors, advance, is_compiled
+from colift.simulation.loop import CYCLE_WIDTH, Periods, Vectors, advance, is_compiled, kernels_of
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus, columns, make_bus
 from colift.team import Team
 
@@ -41,9 +41,7 @@ class Flight:
 
     def __init__(self, mission: Mission) -> None:
         self.mission = mission
-        plant = type(mission.plant)
-        kernels = [type(getattr(mission, layer)).kernel for layer in LAYERS[:-1]]
-        self._kernels = [*kernels, plant.observe, plant.kernel]
+        self._kernels = kernels_of({layer: type(getattr(mission, layer)) for layer in LAYERS})
         self.compiled = all(is_compiled(kernel) for kernel in self._kernels)
         self.loop_time = 0.0
         self.outcome = "completed"

@@ -8,6 +8,7 @@ The loop is compiled when every part is, and runs as plain Python otherwise: sam
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from colift.allocation import base as allocation
 from colift.allocation.base import INFO_SIZE
 from colift.attitude_control import base as attitude_control
+from colift.errors import ColiftError
 from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector
 from colift.load_control import base as load_control
 from colift.plant import base as plant
@@ -187,3 +189,38 @@ def advance(  # type: ignore[no-untyped-def]
 def is_compiled(function: Any) -> bool:
     """Whether a part's kernel is compiled (and so can go into the compiled loop)."""
     return hasattr(function, "py_func")
+
+
+KERNEL_SIGNATURES = {
+    "reference": {"kernel": reference.SIGNATURE},
+    "load_control": {"kernel": load_control.SIGNATURE},
+    "allocation": {"kernel": allocation.SIGNATURE},
+    "position_control": {"kernel": position_control.SIGNATURE},
+    "attitude_control": {"kernel": attitude_control.SIGNATURE},
+    "plant": {"observe": plant.OBSERVE_SIGNATURE, "kernel": plant.STEP_SIGNATURE},
+}
+"""Which functions the part of each layer must have, in the order in which the loop takes them."""
+
+
+def kernels_of(parts: Mapping[str, type]) -> list[Any]:
+    """The kernels of one part a layer, in the loop's order.
+
+    Raises
+    ------
+    ColiftError
+        For a compiled kernel that was not compiled for its layer's signature.
+
+    """
+    found = []
+    for layer, signatures in KERNEL_SIGNATURES.items():
+        for name, wanted in signatures.items():
+            function = getattr(parts[layer], name)
+            offered = getattr(function, "nopython_signatures", [wanted])
+            if (wanted.args, wanted.return_type) not in [(s.args, s.return_type) for s in offered]:
+                raise ColiftError(
+                    f"{layer} part {parts[layer].__name__}: its {name} is compiled for "
+                    f"{', '.join(map(str, offered)) or 'nothing'}, but this layer's functions have "
+                    f"the signature {wanted} (see colift.{layer}.base)"
+                )
+            found.append(function)
+    return found
