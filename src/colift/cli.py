@@ -187,6 +187,103 @@ def reproduce(
         out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
 
 
+@app.command()
+def safety(
+    sizes: Annotated[
+        str, typer.Option(help="Numbers of drones, separated by commas.")
+    ] = "2,3,4,6,8,12,16",
+    cycles: Annotated[
+        int, typer.Option(min=100, max=10_000_000, help="Cycles per team and family of forces.")
+    ] = 20_000,
+    quick: Annotated[bool, typer.Option(help="A tenth of it; for a first look.")] = False,
+    file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Attack the safe allocator and fly it, beside the paper's allocator.
+
+    Alone: smooth, noisy, stepping and adversarial forces; every answer is checked against every
+    limit. In flight: from rest, with a drone below the load, fast, heavy, after losing a drone, for
+    an hour. The table says where it holds and where not.
+    """
+    counts = numbers(sizes, 2, 64)
+    with loading():
+        from colift import safety as module
+    with progress("Attacking and flying") as advance:
+        result = module.show_all(
+            counts, cycles // (10 if quick else 1), quick=quick, progress=advance
+        )
+    if file is not None:
+        from colift.recording import atomic_path
+
+        with atomic_path(file) as temporary:
+            temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
+    if as_json:
+        emit(result)
+        return
+    for title, header, rows in module.tables(result):
+        table = Table(title=title, title_justify="left")
+        for k, name in enumerate(header):
+            table.add_column(name, justify="left" if k in (0, len(header) - 1) else "right")
+        for row in rows:
+            table.add_row(*map(escape, row))
+        out.print(table)
+
+
+@app.command()
+def feasibility(
+    mission: Annotated[
+        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
+    ],
+    sets: Sets = None,
+    as_json: Json = False,
+) -> None:
+    """Before a flight: can these drones hold this load within these limits, and how well.
+
+    For a mission with the safe allocator, in hover. Exit code 1 if they cannot.
+    """
+    from colift.mission.load import parse_override
+
+    with loading():
+        import colift
+        from colift.allocation._feasibility import feasibility as judge
+        from colift.allocation.safe import Safe
+
+        loaded = colift.load_mission(mission, dict(parse_override(text) for text in sets or []))
+    if not isinstance(loaded.allocation, Safe):
+        raise ColiftError(
+            f"{loaded.name}: its allocator {loaded.kinds['allocation']!r} has no limits to judge; "
+            "try --set allocation.kind=safe"
+        )
+    found = judge(loaded.team, loaded.allocation)
+    weight = loaded.team.load_mass * loaded.team.gravity
+    widest = math.degrees(found.widest_angle)
+    if as_json:
+        emit(
+            {
+                "mission": loaded.name, "feasible": found.ok, "conflicts": list(found.conflicts),
+                "weight_N": weight, "lightest_N": found.lightest, "heaviest_N": found.heaviest,
+                "margin": found.margin, "widest_angle_deg": widest,
+                "tensions_N": found.tensions.tolist(),
+            }
+        )  # fmt: skip
+    else:
+        part, n = loaded.allocation, loaded.drones.count
+        out.print(f"{escape(loaded.name)}: {n} drones, load of {weight:.4g} N (hover)")
+        out.print(
+            f"Within the limits the cables hold {found.lightest:.4g} to {found.heaviest:.4g} N: "
+            f"{found.margin:.2f} times the load."
+        )
+        out.print(
+            f"{n} cables within {part.max_cone_deg:g} deg of the vertical can be {widest:.1f} deg apart; "
+            f"{part.min_angle_deg:g} deg are asked for."
+        )
+        for conflict in found.conflicts:
+            out.print(f"[red]conflict[/red]: {escape(conflict)}")
+        out.print("feasible" if found.ok else "not feasible")
+    if not found.ok:
+        raise typer.Exit(EXIT_ERROR)
+
+
 @app.command(name="list")
 def list_(
     as_json: Json = False,
@@ -228,12 +325,7 @@ def bench(
     Warm-up is excluded; median, 99th percentile and worst of many calls are shown, with the
     iterations and the worst optimality residual, so that a fast wrong answer shows.
     """
-    try:
-        counts = [int(text) for text in sizes.split(",")]
-    except ValueError:
-        raise typer.BadParameter(f"{sizes!r} is not a list of whole numbers") from None
-    if any(not 1 <= n <= 1024 for n in counts):
-        raise typer.BadParameter("each number of drones must be between 1 and 1024")
+    counts = numbers(sizes, 1, 1024)
     with loading():
         from colift import benchmark
     with progress("Timing") as advance:
@@ -268,6 +360,17 @@ def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
 
         files["report"] = write_report(flown.recording, folder, metrics=flown.metrics)
     return files
+
+
+def numbers(text: str, least: int, most: int) -> list[int]:
+    """A list of whole numbers, separated by commas."""
+    try:
+        found = [int(item) for item in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a list of whole numbers") from None
+    if any(not least <= n <= most for n in found):
+        raise typer.BadParameter(f"each number of drones must be between {least} and {most}")
+    return found
 
 
 def plain(value: Any) -> Any:

@@ -1,0 +1,88 @@
+"""The safe allocator's promises under attack and in flight, beside the paper's allocator."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from colift import safety
+from colift.allocation.sqp import Sqp
+
+
+@pytest.mark.parametrize("family", safety.FAMILIES)
+@pytest.mark.parametrize("n", [2, 3, 4, 6, 8])
+def test_every_limit_holds_in_every_cycle(n: int, family: str) -> None:
+    found = safety.attack(n, family, 4_000, safety.problem(n)[1])
+    assert found.smallest_angle >= found.least_angle - safety.ANGLE_TOLERANCE
+    assert found.limits_broken_by <= 1e-6
+    assert found.not_finite == 0
+    assert found.holds
+
+
+@pytest.mark.parametrize("family", ["smooth", "noise", "coloured noise"])
+@pytest.mark.parametrize("n", [3, 4, 6, 8])
+def test_the_force_is_balanced_in_every_smooth_or_noisy_cycle(n: int, family: str) -> None:
+    found = safety.attack(n, family, 4_000, safety.problem(n)[1])
+    assert found.limited_share == 0.0
+    assert found.unflagged_imbalance == 0
+
+
+@pytest.mark.parametrize("n", [4, 8])
+def test_the_papers_allocator_breaks_the_limit_under_the_same_forces(n: int) -> None:
+    mu = safety.problem(n)[1].mu
+    worst = min(safety.attack(n, f, 4_000, Sqp(mu=mu)).smallest_angle for f in safety.FAMILIES)
+    assert worst < 29.0  # the safe allocator keeps 30 under each of them
+
+
+def test_an_attack_is_repeatable_and_its_slices_do_not_matter(monkeypatch) -> None:
+    part = safety.problem(4)[1]
+    first = safety.attack(4, "adversary", 1_500, part)
+    assert safety.attack(4, "adversary", 1_500, part).smallest_angle == first.smallest_angle
+    assert safety.attack(4, "adversary", 1_500, part, seed=1).smallest_angle != first.smallest_angle
+
+
+@pytest.mark.parametrize(
+    "title",
+    ["spiral from rest, cables 7 deg apart", "four drones, then three", "eight drones, then seven",
+     "twice the load", "four times the load"],
+)  # fmt: skip
+def test_flights_that_the_papers_allocator_does_not_survive(title: str) -> None:
+    ours, paper = safety.fly(title, "safe"), safety.fly(title, "sqp")
+    assert ours.survives
+    assert ours.separated
+    assert not paper.survives
+    assert ours.tracking_rms < paper.tracking_rms
+
+
+def test_a_drone_below_the_load_comes_up() -> None:
+    ours = safety.fly("one drone starts below the load", "safe")
+    assert ours.survives
+    assert ours.smallest_angle_later > 40.0
+
+
+def test_commands_print_one_object_and_tell_by_exit_code() -> None:
+    def colift(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "colift", *arguments],
+            capture_output=True, text=True, check=False, timeout=300,
+        )  # fmt: skip
+
+    good = colift("feasibility", "hover", "--json")
+    assert good.returncode == 0
+    found = json.loads(good.stdout)
+    assert found["feasible"]
+    assert found["lightest_N"] < found["weight_N"] < found["heaviest_N"]
+    heavy = colift("feasibility", "hover", "--set", "load.mass=3.0")
+    assert heavy.returncode != 0
+    assert "tension_max" in heavy.stderr + heavy.stdout
+    none = colift("feasibility", "paper-spiral")
+    assert none.returncode == 1
+    assert "allocation.kind=safe" in none.stderr
+    shown = colift("safety", "--sizes", "4", "--cycles", "1000", "--quick", "--json")
+    assert shown.returncode == 0, shown.stderr
+    result = json.loads(shown.stdout)
+    assert len(result["attacks"]) == 2 * len(safety.FAMILIES)
+    assert len(result["flights"]) == 2 * len(safety.FLIGHTS)
