@@ -410,6 +410,7 @@ def test_sixty_four_drones():
     rig.thrusts[:] = rng.uniform(0.0, 10.0, 64)
     rig.step(count=200)
     assert np.isfinite(rig.state).all()
-    flown = colift.run("hover", drones__count=64, load__mass=4.0, timing__duration=0.2)
+    settings = {"drones__count": 64, "load__mass": 4.0, "timing__duration": 0.2}
+    flown = colift.run("hover", allocator="sqp", **settings)
     assert flown.recording.outcome == "completed"
     assert all(np.isfinite(a).all() for a in flown.recording.arrays.values() if a.ndim > 1)
