@@ -223,7 +223,8 @@ def safety(
     for title, header, rows in module.tables(result):
         table = Table(title=title, title_justify="left")
         for k, name in enumerate(header):
-            table.add_column(name, justify="left" if k in (0, len(header) - 1) else "right")
+            edge = k in (0, len(header) - 1)
+            table.add_column(name, justify="left" if edge else "right", no_wrap=not edge)
         for row in rows:
             table.add_row(*map(escape, row))
         out.print(table)

@@ -102,7 +102,7 @@ def _adversary(t: Array, rng: np.random.Generator) -> Array:
 FAMILIES: dict[str, Callable[[Array, np.random.Generator], Array]] = {
     "smooth": _smooth,
     "noise": _noise,
-    "coloured noise": _coloured,
+    "coloured": _coloured,
     "steps": _steps,
     "adversary": _adversary,
 }
