@@ -44,23 +44,20 @@ def test_an_attack_is_repeatable_and_its_slices_do_not_matter(monkeypatch) -> No
     assert safety.attack(4, "adversary", 1_500, part, seed=1).smallest_angle != first.smallest_angle
 
 
-@pytest.mark.parametrize(
-    "title",
-    ["spiral from rest, cables 7 deg apart", "four drones, then three", "eight drones, then seven",
-     "twice the load", "four times the load"],
-)  # fmt: skip
-def test_flights_that_the_papers_allocator_does_not_survive(title: str) -> None:
+@pytest.mark.parametrize("title", [t for t in safety.FLIGHTS if "hour" not in t])
+def test_every_flight_keeps_apart_and_tracks_no_worse_than_the_papers(title: str) -> None:
     ours, paper = safety.fly(title, "safe"), safety.fly(title, "sqp")
     assert ours.survives
     assert ours.separated
-    assert not paper.survives
+    assert ours.failures == 0
     assert ours.tracking_rms < paper.tracking_rms
 
 
-def test_a_drone_below_the_load_comes_up() -> None:
-    ours = safety.fly("one drone starts below the load", "safe")
-    assert ours.survives
-    assert ours.smallest_angle_later > 40.0
+@pytest.mark.parametrize(
+    "title", ["one drone starts below the load", "twice the load", "four times the load"]
+)
+def test_flights_that_the_papers_allocator_does_not_survive(title: str) -> None:
+    assert not safety.fly(title, "sqp").survives
 
 
 def test_commands_print_one_object_and_tell_by_exit_code() -> None:

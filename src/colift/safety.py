@@ -226,7 +226,10 @@ FLIGHTS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
         {},
     ),
 }
-"""Flights by title: mission, changes for both allocators, further changes for the safe one."""
+"""Flights by title: mission, changes for both allocators, further changes for the safe one.
+
+Both fly with the position controller that feeds the cables' motion forward: it is better for both.
+"""
 
 UNSETTLED = 5.0
 """Time for which a start that breaks the limits may go on doing so, s."""
@@ -262,6 +265,7 @@ def fly(title: str, allocator: str, *, quick: bool = False) -> Flown:
     """Fly one of :data:`FLIGHTS` with the safe allocator or the paper's."""
     mission, changes, safe_only = FLIGHTS[title]
     overrides = {
+        "position_control.kind": "feed-forward",
         **changes,
         "allocation.kind": allocator,
         **(safe_only if allocator == "safe" else {}),

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
-from colift.math import quaternion
 from colift.part import Vector
+from colift.position_control._aim import aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
 
@@ -57,45 +57,7 @@ def _pid(  # type: ignore[no-untyped-def]
                 - params[7 + k] * memory[o + k]
             )
             norm += u[i, k] * u[i, k]
-        norm = math.sqrt(norm)
-        thrusts[i] = norm
-        if norm > 1e-9:
-            hx, hy, hz = u[i, 0] / norm, u[i, 1] / norm, u[i, 2] / norm
-        else:
-            hx, hy, hz = 0.0, 0.0, 1.0
-        if fresh:
-            memory[o + 9] = hx
-            memory[o + 10] = hy
-            memory[o + 11] = hz
-        dx = (1.0 - keep_u) * (hx - memory[o + 9]) / dt + keep_u * memory[o + 12]
-        dy = (1.0 - keep_u) * (hy - memory[o + 10]) / dt + keep_u * memory[o + 13]
-        dz = (1.0 - keep_u) * (hz - memory[o + 11]) / dt + keep_u * memory[o + 14]
-        memory[o + 9] = hx
-        memory[o + 10] = hy
-        memory[o + 11] = hz
-        memory[o + 12] = dx
-        memory[o + 13] = dy
-        memory[o + 14] = dz
-        qw, qx, qy, qz = quaternion.from_thrust_direction(hx, hy, hz)
-        attitudes[i, 0] = qw
-        attitudes[i, 1] = qx
-        attitudes[i, 2] = qy
-        attitudes[i, 3] = qz
-        # Omega_id = 2 Im(q* qdot), with qdot from the rate of the thrust direction.
-        root = 2.0 * qw
-        if root < 1e-3:
-            rates[i, 0] = 0.0
-            rates[i, 1] = 0.0
-            rates[i, 2] = 0.0
-        else:
-            stretch = dz / root
-            w_dot = 0.5 * stretch
-            x_dot = -dy / root + hy * stretch / (root * root)
-            y_dot = dx / root - hx * stretch / (root * root)
-            _, ox, oy, oz = quaternion.multiply(qw, -qx, -qy, 0.0, w_dot, x_dot, y_dot, 0.0)
-            rates[i, 0] = 2.0 * ox
-            rates[i, 1] = 2.0 * oy
-            rates[i, 2] = 2.0 * oz
+        aim(i, fresh, dt, keep_u, u, math.sqrt(norm), memory, o + 9, thrusts, attitudes, rates)
 
 
 class Pid(PositionControlPart):
