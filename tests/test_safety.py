@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,16 @@ def test_actual_cables_keep_the_limit_less_a_margin_in_every_shipped_mission(mis
     least = flown.mission.allocation.min_angle_deg - safety.ACTUAL_MARGIN
     assert np.degrees(np.nanmin(pairwise_angles(kept))) >= least
     assert flown.metrics["allocator_failures"] == 0
+
+
+def test_the_verdict_names_every_fault() -> None:
+    good = safety.Flown("t", "safe", "completed", 40.0, 40.0, 0.01, 0.05, 0.0, 0, 0)
+    assert safety._verdict(good, good) == "holds"
+    far = replace(good, tracking_max=0.5)
+    assert "does not survive" in safety._verdict(far, good)
+    assert "falls to 20.0 deg" in safety._verdict(replace(good, smallest_angle_later=20.0), good)
+    assert "2.0 times worse" in safety._verdict(replace(good, tracking_rms=0.02), good)
+    assert safety._verdict(good, far) == "holds; the paper's allocator does not survive"
 
 
 def test_commands_print_one_object_and_tell_by_exit_code() -> None:

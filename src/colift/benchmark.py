@@ -27,7 +27,7 @@ from rich.table import Table
 from colift.allocation.base import INFO_SIZE, SIGNATURE
 from colift.allocation.sqp import Sqp, SqpAllocator
 from colift.geometry import Array, ring
-from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector
+from colift.jit import f8, kernel, matrix, monotonic_ns, vector, void
 from colift.recording import versions
 from colift.runner import run as fly
 from colift.team import Team
@@ -44,7 +44,7 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREA
 
 
 @kernel(
-    i8(
+    void(
         types.FunctionType(SIGNATURE),
         matrix,
         vector,
@@ -61,7 +61,6 @@ def _time_calls(  # type: ignore[no-untyped-def]
     allocate, forces, acceleration, dt, params, memory, tensions, directions, info, out
 ):
     """Call an allocator once per force; out: duration (ns), iterations, KKT residual, status."""
-    failures = 0
     for k in range(forces.shape[0]):
         begin = monotonic_ns()
         status = allocate(forces[k], acceleration, dt, params, memory, tensions, directions, info)
@@ -70,9 +69,6 @@ def _time_calls(  # type: ignore[no-untyped-def]
         out[k, 1] = info[0]
         out[k, 2] = info[1]
         out[k, 3] = status
-        if status != 0:
-            failures += 1
-    return failures
 
 
 def scaled_problem(n: int) -> tuple[float, float]:

@@ -108,12 +108,7 @@ class Reproduction:
 
 def command_of(flight: str) -> str:
     """Command line that repeats a flight."""
-    import json
-
-    sets = "".join(
-        f" --set '{key}={json.dumps(value) if not isinstance(value, list) else _toml(value)}'"
-        for key, value in FLIGHTS[flight].items()
-    )
+    sets = "".join(f" --set '{key}={_toml(value)}'" for key, value in FLIGHTS[flight].items())
     return f"colift run paper-spiral{sets}"
 
 

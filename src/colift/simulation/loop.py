@@ -19,7 +19,7 @@ from colift.allocation import base as allocation
 from colift.allocation.base import INFO_SIZE
 from colift.attitude_control import base as attitude_control
 from colift.errors import ColiftError
-from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector
+from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector, void
 from colift.load_control import base as load_control
 from colift.plant import base as plant
 from colift.position_control import base as position_control
@@ -55,7 +55,7 @@ VECTORS_TYPE = types.NamedUniTuple(vector, 6, Vectors)
 PERIODS_TYPE = types.NamedTuple([f8] + [i8] * 5, Periods)
 CYCLE_WIDTH = len(CYCLE_SIGNALS)
 
-SIGNATURE = i8(
+SIGNATURE = void(
     i8,
     i8,
     PERIODS_TYPE,
@@ -94,9 +94,8 @@ def advance(  # type: ignore[no-untyped-def]
     log,
     cycles,
 ):
-    """Run physics steps ``first <= k < last`` and return how many allocations were not ok."""
+    """Run physics steps ``first <= k < last``."""
     dt = every.step
-    failures = 0
     for k in range(first, last):
         observe(
             params.plant,
@@ -139,8 +138,6 @@ def advance(  # type: ignore[no-untyped-def]
             for m in range(INFO_SIZE):
                 cycles[row, 1 + m] = info[m]
             cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9
-            if status != 0:
-                failures += 1
 
         if k % every.position_control == 0:
             control_position(
@@ -183,7 +180,6 @@ def advance(  # type: ignore[no-untyped-def]
 
         if k % every.recording == 0:
             log[k // every.recording, :] = bus.row
-    return failures
 
 
 def is_compiled(function: Any) -> bool:
