@@ -31,7 +31,7 @@ def test_every_limit_holds_in_every_cycle(n: int, family: str) -> None:
 @pytest.mark.parametrize("n", [3, 4, 6, 8])
 def test_the_force_is_balanced_in_every_smooth_or_noisy_cycle(n: int, family: str) -> None:
     found = safety.attack(n, family, 4_000, safety.problem(n)[1])
-    assert found.limited_share == 0.0
+    assert found.yield_share == 0.0
     assert found.unflagged_imbalance == 0
 
 

@@ -37,6 +37,7 @@ i8 = types.int64
 void = types.void
 vector = types.float64[::1]
 matrix = types.float64[:, ::1]
+tensor = types.float64[:, :, ::1]
 mask = types.boolean[::1]
 
 # `contract` lets a*b + c become one fused instruction; nothing here assumes the absence of NaN.

@@ -59,6 +59,8 @@ KEEP = 0.05
 """Part of its margin that every limit keeps in one step."""
 Z_BAND = 10.0
 """Multipliers stay within this factor of kappa / g."""
+SHARPEN, SHARP = 0.1, 1e-3
+"""While force is given up the barrier of the rate falls by the factor, down to that part of kappa."""
 RETRIES = 8
 """Most step lengths tried in one iteration."""
 
@@ -319,13 +321,15 @@ def iterate(  # type: ignore[no-untyped-def]
         )
         if iterations > 0:
             residual = newton.stationarity(n, alpha, rows, lam)
-            if residual <= tolerance:
-                if balance <= 1e-10:
-                    outcome = CONVERGED
-                    break
-                if bounded:
+            if residual <= tolerance and balance <= 1e-10:
+                outcome = CONVERGED
+                break
+            if bounded:
+                if residual <= tolerance and kappa_rate <= SHARP * kappa:
                     outcome = FORCE_REDUCED
                     break
+                # The turn is to be used to the full before force is given up.
+                kappa_rate = max(SHARPEN * kappa_rate, min(SHARP * kappa, kappa_rate))
             if iterations >= max_iterations:
                 break
         if not newton.factor(n, shift, mu, T, alpha, rows, K, first, Y):
