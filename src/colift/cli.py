@@ -246,6 +246,7 @@ def feasibility(
 
     with loading():
         import colift
+        from colift.allocation._feasibility import SEARCHED
         from colift.allocation._feasibility import feasibility as judge
         from colift.allocation.safe import Safe
 
@@ -264,11 +265,16 @@ def feasibility(
                 "mission": loaded.name, "feasible": found.ok, "conflicts": list(found.conflicts),
                 "weight_N": weight, "lightest_N": found.lightest, "heaviest_N": found.heaviest,
                 "margin": found.margin, "widest_angle_deg": widest,
+                "most_cables_found": found.most_cables[0], "most_cables_bound": found.most_cables[1],
                 "tensions_N": found.tensions.tolist(),
             }
         )  # fmt: skip
     else:
         part, n = loaded.allocation, loaded.drones.count
+        most, bound = found.most_cables
+        allowed = f"{most} cables (found; never more than {bound})"
+        if most >= SEARCHED:
+            allowed = f"{most} cables or more"
         out.print(f"{escape(loaded.name)}: {n} drones, load of {weight:.4g} N (hover)")
         out.print(
             f"Within the limits the cables hold {found.lightest:.4g} to {found.heaviest:.4g} N: "
@@ -276,7 +282,7 @@ def feasibility(
         )
         out.print(
             f"{n} cables within {part.max_cone_deg:g} deg of the vertical can be {widest:.1f} deg apart; "
-            f"{part.min_angle_deg:g} deg are asked for."
+            f"{part.min_angle_deg:g} deg are asked for, which allows {allowed}."
         )
         for conflict in found.conflicts:
             out.print(f"[red]conflict[/red]: {escape(conflict)}")

@@ -53,3 +53,17 @@ def zero_yaw_quaternion(thrust_direction: Array) -> Array:
         ],
         axis=-1,
     )
+
+
+def widest_gap(directions: Array, cone: float) -> Array:
+    """Direction (3,) within ``cone`` (rad) of the vertical that is farthest from the given ones (n, 3).
+
+    The best of a grid of about a degree.
+    """
+    rim = np.cos(cone)
+    count = max(64, round(20_000 * (1.0 - rim)))
+    k = np.arange(count) + 0.5
+    down = 1.0 - (1.0 - rim) * k / count
+    level, azimuth = np.sqrt(1.0 - down**2), np.pi * (3.0 - np.sqrt(5.0)) * k
+    grid = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), -down])
+    return np.asarray(grid[np.argmin(np.max(grid @ directions.T, axis=1))])

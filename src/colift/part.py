@@ -24,6 +24,7 @@ from colift.errors import ColiftError, UnknownNameError
 from colift.team import Team
 
 Vector = NDArray[np.float64]
+Places = NDArray[np.int64]
 
 LAYERS = (
     "reference",
@@ -58,18 +59,29 @@ class Part(BaseModel):
         """Memory vector of the kernel in its initial state (integrators, warm starts, scratch)."""
         return np.zeros(0)
 
-    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
-        """Memory after ``drone`` has left; ``team`` is what remains.
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        """Memory for the flight's next leg, after a drone has left or joined.
 
-        What does not depend on the number of drones is kept, anything else starts anew; a part that
-        remembers something per drone overrides this.
+        ``old`` is the memory so far, ``fresh`` that of a start with the new team; ``places[i]`` is the
+        place that drone i of the new team had in the old one, or -1. What does not depend on the number
+        of drones is kept, anything else starts anew; a part that remembers something per drone
+        overrides this, mostly with :func:`carry_rows`.
         """
-        fresh = self.memory(team)
-        return memory if fresh.size == memory.size else fresh
+        return old if fresh.size == old.size else fresh
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""
         return []
+
+
+def carry_rows(old: Vector, fresh: Vector, head: int, width: int, places: Places) -> Vector:
+    """Copy ``head`` values and then the ``width`` values of every drone that stays into ``fresh``."""
+    fresh[:head] = old[:head]
+    for new, place in enumerate(places):
+        if place >= 0:
+            begin = head + width * place
+            fresh[head + width * new : head + width * (new + 1)] = old[begin : begin + width]
+    return fresh
 
 
 _registered: dict[tuple[str, str], type[Part]] = {}

@@ -237,6 +237,7 @@ FLIGHTS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     ),
     "four drones, then three": ("four-to-three", {}, {}),
     "eight drones, then seven": ("eight-to-seven", {}, {}),
+    "three drones, then four": ("three-to-four", {}, {}),
     "twice the load": ("paper-spiral", {"load.mass": 0.45}, SCALED),
     "four times the load": ("paper-spiral", {"load.mass": 0.9}, SCALED),
     "one hour of spiral": (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,13 +39,14 @@ class Team:
         """Number of drones."""
         return int(self.masses.shape[0])
 
-    def without(self, drone: int) -> Team:
-        """The team after one drone has left."""
+    def of(self, drones: Sequence[int]) -> Team:
+        """The team of these of its drones."""
+        chosen = list(drones)
         return replace(
             self,
-            masses=np.delete(self.masses, drone),
-            inertias=np.delete(self.inertias, drone, axis=0),
-            cable_lengths=np.delete(self.cable_lengths, drone),
+            masses=self.masses[chosen],
+            inertias=self.inertias[chosen],
+            cable_lengths=self.cable_lengths[chosen],
         )
 
     @classmethod

@@ -7,7 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from colift.allocation._feasibility import feasibility, spread_formation, widest_angle
+from colift.allocation._feasibility import (
+    feasibility,
+    most_cables,
+    spread_formation,
+    widest_angle,
+)
 from colift.allocation.safe import Safe, SafeAllocator
 from colift.geometry import pairwise_angles
 from colift.team import Team
@@ -78,3 +83,12 @@ def test_a_load_beyond_the_margin_is_a_conflict():
     assert not found.ok
     assert found.margin < 1.0
     assert "weight" in found.conflicts[0]
+
+
+@pytest.mark.parametrize(("angle", "cone", "least"), [(30, 60, 16), (30, 45, 10), (59, 60, 6)])
+def test_the_number_of_cables_that_an_angle_allows(angle, cone, least):
+    found, bound = most_cables(math.radians(angle), math.radians(cone))
+    assert least <= found <= bound
+    assert math.degrees(widest_angle(found + 1, math.radians(cone))) < angle
+    directions = spread_formation(found, math.radians(cone), math.radians(angle))
+    assert np.degrees(pairwise_angles(directions).min()) >= angle

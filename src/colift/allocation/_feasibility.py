@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 STEPS = 400
 """Ascent steps from one start of the search for a wide formation."""
 SEARCHED = 128
-"""Most cables for which a formation is searched to decide on a conflict."""
+"""Most cables for which a formation is searched."""
 STARTS = 6
 """Random starts of that search, after the regular ones."""
 
@@ -44,6 +44,8 @@ class Feasibility:
         ``heaviest / weight``; below 1 the load cannot be lifted.
     widest_angle : float
         Widest least angle between two cables that was found for this cone, rad.
+    most_cables : tuple of int
+        How many cables the least angle allows in this cone: found, and never more than.
     conflicts : tuple of str
         Pairs of limits that cannot hold together, by name and value.
     directions : (n, 3) array
@@ -58,6 +60,7 @@ class Feasibility:
     heaviest: float
     margin: float
     widest_angle: float
+    most_cables: tuple[int, int]
     conflicts: tuple[str, ...]
     directions: Array
     tensions: Array
@@ -97,6 +100,7 @@ def feasibility(team: Team, settings: Safe) -> Feasibility:
         heaviest=heaviest,
         margin=heaviest / weight,
         widest_angle=max(angle, widest_angle(team.n, cone)),
+        most_cables=most_cables(least, cone),
         conflicts=tuple(conflicts),
         directions=hover.directions,
         tensions=hover.tensions,
@@ -181,6 +185,17 @@ def widest_angle(n: int, cone: float) -> float:
     Reproducible: the search starts from rings and from a fixed seed. n = 4 in 60 degrees: 75.5.
     """
     return widest_formation(n, cone)[1]
+
+
+def most_cables(min_angle: float, cone: float) -> tuple[int, int]:
+    """How many cables ``min_angle`` (rad) allows in the cone: found, and never more than; up to ``SEARCHED``."""
+    found = 1
+    while found < SEARCHED and widest_formation(found + 1, cone, enough=min_angle)[1] >= min_angle:
+        found += 1
+    bound = found
+    while bound < SEARCHED and packing_bound(bound + 1, cone) >= min_angle:
+        bound += 1
+    return found, bound
 
 
 @lru_cache(maxsize=64)

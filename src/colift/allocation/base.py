@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 import operator
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -70,8 +71,8 @@ class AllocatorPart(Part):
 
     layer: ClassVar[str] = "allocation"
 
-    def without(self, drone: int) -> AllocatorPart:
-        """Settings after ``drone`` has left; one with values per cable drops that cable's."""
+    def of(self, drones: Sequence[int]) -> AllocatorPart:
+        """Settings for the team of these drones; one with values per cable keeps theirs."""
         return self
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -292,9 +293,9 @@ class Safe(AllocatorPart):
                 )
         return problems + feasible.conflicts_of(team, self)
 
-    def without(self, drone: int) -> Safe:
+    def of(self, drones: Sequence[int]) -> Safe:
         lists = {
-            name: [*value[:drone], *value[drone + 1 :]]
+            name: [value[drone] for drone in drones]
             for name in ("tension_min", "tension_max", "max_thrust", "weights")
             if isinstance(value := getattr(self, name), list)
         }

@@ -216,7 +216,9 @@ def _cross_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
                 "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
             )
     left = set(range(n))
-    for i, event in enumerate(frame.events):
+    if all(type(e.value) is int for e in frame.events if e.field.startswith("drones.")):
+        left = set(frame.first_drones())
+    for i, event in sorted(enumerate(frame.events), key=lambda pair: pair[1].at):
         if "timing" not in broken and event.at > timing.duration:
             yield Problem(
                 f"events.{i}.at",
@@ -225,7 +227,15 @@ def _cross_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             )
         section, _, name = event.field.partition(".")
         if section == "drones" and "drones" not in broken:
-            if type(event.value) is not int or event.value not in left or len(left) == 1:
+            if name == "join":
+                away = sorted(set(range(n)) - left)
+                if type(event.value) is not int or event.value not in away:
+                    others = ", ".join(map(str, away)) or "none"
+                    message = f"must be one of the drones that do not fly then ({others})"
+                    yield Problem(f"events.{i}.value", repr(event.value), message)
+                else:
+                    left.add(event.value)
+            elif type(event.value) is not int or event.value not in left or len(left) == 1:
                 flying = ", ".join(map(str, sorted(left)))
                 message = f"must be one of the drones that fly then ({flying}), not the last one"
                 yield Problem(f"events.{i}.value", repr(event.value), message)

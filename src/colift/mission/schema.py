@@ -165,11 +165,13 @@ class Event(Section):
 
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
-    field: Annotated[str, Field(pattern=r"^(load\.mass|drones\.lose|allocation\.[a-z_]+)$")]
-    """What changes: ``load.mass`` (the plant's only), a setting of the allocator, or ``drones.lose``."""
+    field: Annotated[str, Field(pattern=r"^(load\.mass|drones\.(lose|join)|allocation\.[a-z_]+)$")]
+    """What changes: ``load.mass`` (the plant's only), a setting of the allocator, ``drones.lose`` or
+    ``drones.join``."""
     value: Any
     """New value, in the field's unit; for ``drones.lose`` the number, from 0, of the drone whose cable is
-    cut and that leaves the team, which is told at once."""
+    cut and that leaves the team, which is told at once; for ``drones.join`` the drone that hooks in then, in
+    the widest gap between the cables, at the load's velocity, and that is not there before."""
 
 
 class Frame(Section):
@@ -202,12 +204,21 @@ class Frame(Section):
             gravity=self.world.gravity,
         )
 
+    def first_drones(self) -> list[int]:
+        """Numbers of the drones that fly from the start: all but those that join before they leave."""
+        first: dict[int, str] = {}
+        for event in sorted(self.events, key=lambda event: event.at):
+            if event.field.startswith("drones."):
+                first.setdefault(event.value, event.field)
+        return [i for i in range(self.drones.count) if first.get(i) != "drones.join"]
+
     def start_directions(self) -> Vector:
-        """Unit cable directions (n, 3) at t = 0."""
+        """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""
+        drones = self.first_drones()
         if self.start.directions is None:
             cone, heading = math.radians(self.start.cone_deg), math.radians(self.start.heading_deg)
-            return ring(self.drones.count, cone, heading=heading)
-        given = np.array(self.start.directions, dtype=float)
+            return ring(len(drones), cone, heading=heading)
+        given = np.array(self.start.directions, dtype=float)[drones]
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from colift.jit import inline, kernel
 from colift.math import quaternion
-from colift.part import Vector
+from colift.part import Places, Vector, carry_rows
 from colift.plant.base import OBSERVE_SIGNATURE, STEP_SIGNATURE, PlantPart, Start
 from colift.team import Team
 
@@ -213,9 +213,5 @@ class RigidCables(PlantPart):
         drones[:, 6:10] = start.attitudes
         return memory
 
-    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
-        kept = self.memory(team)
-        drones = memory[6 : state_size(team.n + 1)].reshape(team.n + 1, _DRONE)
-        kept[:6] = memory[:6]
-        kept[6 : state_size(team.n)] = np.delete(drones, drone, axis=0).ravel()
-        return kept
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        return carry_rows(old, fresh, 6, _DRONE, places)

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from colift.jit import kernel
 from colift.math.sphere import follow
-from colift.part import Vector
+from colift.part import Places, Vector, carry_rows
 from colift.position_control._aim import aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
@@ -18,7 +18,7 @@ from colift.team import Team
 Gain = Annotated[float, Field(ge=0.0)]
 
 _HEAD = 13  # params: g, k_p, k_d, k_i (3 each), limit, frequency, time constant; then m, L
-_SLOTS = 18  # memory per drone: integral; direction, rate, acceleration; u_hat, its rate (3 each)
+_SLOTS = 19  # memory per drone: started; integral; direction, rate, acceleration; u_hat, its rate (3 each)
 
 
 @kernel(SIGNATURE)
@@ -28,13 +28,13 @@ def _feed_forward(  # type: ignore[no-untyped-def]
     n = x.shape[0]
     g = params[0]
     limit = params[10]
-    fresh = memory[0] == 0.0
-    memory[0] = 1.0
     keep = math.exp(-dt / params[12]) if params[12] > 0.0 else 0.0
     for i in range(n):
         m_i = params[_HEAD + i]
         L_i = params[_HEAD + n + i]
-        o = 1 + _SLOTS * i
+        fresh = memory[_SLOTS * i] == 0.0
+        memory[_SLOTS * i] = 1.0
+        o = _SLOTS * i + 1
         a = o + 3
         if fresh:
             for k in range(3):
@@ -86,8 +86,7 @@ class FeedForward(PositionControlPart):
         return np.concatenate([head, team.masses, team.cable_lengths])
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(1 + _SLOTS * team.n)
+        return np.zeros(_SLOTS * team.n)
 
-    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
-        slots = np.delete(memory[1:].reshape(team.n + 1, _SLOTS), drone, axis=0)
-        return np.concatenate([memory[:1], slots.ravel()])
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        return carry_rows(old, fresh, 0, _SLOTS, places)

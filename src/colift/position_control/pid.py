@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
-from colift.part import Vector
+from colift.part import Places, Vector, carry_rows
 from colift.position_control._aim import aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
@@ -17,7 +17,7 @@ from colift.team import Team
 Gain = Annotated[float, Field(ge=0.0)]
 
 _HEAD = 14  # params: g, k_p, k_d, k_i (3 each), limit, two time constants, rates on; then m, L
-_SLOTS = 15  # memory per drone: integral, alpha, alpha rate, u_hat, u_hat rate (3 each)
+_SLOTS = 16  # memory per drone: started; integral, alpha, alpha rate, u_hat, u_hat rate (3 each)
 
 
 @kernel(SIGNATURE)
@@ -27,15 +27,15 @@ def _pid(  # type: ignore[no-untyped-def]
     n = x.shape[0]
     g = params[0]
     limit = params[10]
-    fresh = memory[0] == 0.0
-    memory[0] = 1.0
     keep_alpha = math.exp(-dt / params[11]) if params[11] > 0.0 else 0.0
     keep_u = math.exp(-dt / params[12]) if params[12] > 0.0 else 0.0
     rates_on = params[13]
     for i in range(n):
         m_i = params[_HEAD + i]
         L_i = params[_HEAD + n + i]
-        o = 1 + _SLOTS * i
+        fresh = memory[_SLOTS * i] == 0.0
+        memory[_SLOTS * i] = 1.0
+        o = _SLOTS * i + 1
         norm = 0.0
         for k in range(3):
             # Rate of the wanted direction: first-order filter on the difference quotient.
@@ -96,8 +96,7 @@ class Pid(PositionControlPart):
         return np.concatenate([head, team.masses, team.cable_lengths])
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(1 + _SLOTS * team.n)
+        return np.zeros(_SLOTS * team.n)
 
-    def memory_without(self, team: Team, memory: Vector, drone: int) -> Vector:
-        slots = np.delete(memory[1:].reshape(team.n + 1, _SLOTS), drone, axis=0)
-        return np.concatenate([memory[:1], slots.ravel()])
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        return carry_rows(old, fresh, 0, _SLOTS, places)

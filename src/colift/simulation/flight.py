@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.allocation.base import INFO_SIZE
-from colift.geometry import min_norm_tensions, zero_yaw_quaternion
+from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.mission.schema import Event, Mission
 from colift.part import LAYERS, Vector
 from colift.plant.base import Start
@@ -49,14 +49,14 @@ class Flight:
         self._every = Periods(mission.timing.step, **mission.timing.multiples())
         self._cycles = np.zeros((self._rows(self._every.allocation), CYCLE_WIDTH))
         self._info = np.zeros(INFO_SIZE)
-        team = mission.team
-        memory = {layer: getattr(mission, layer).memory(team) for layer in LAYERS[:-1]}
-        memory["plant"] = mission.plant.initial(team, start_state(mission))
         self._allocation = mission.allocation
-        self._load_mass = team.load_mass
+        self._load_mass = mission.load.mass
         self._legs: list[_Leg] = []
-        self._begin_leg(tuple(range(team.n)), team, memory)
-        self._legs[-1].bus.desired_directions[:] = mission.start_directions()
+        drones = mission.first_drones()
+        team = mission.team.of(drones)
+        start = start_state(mission)
+        self._begin_leg(drones, self._fresh_memory(team, start))
+        self._legs[-1].bus.desired_directions[:] = start.directions
 
     def run(self, progress: Progress | None = None) -> Recording:
         """Fly from where we are to the end of the mission.
@@ -106,15 +106,20 @@ class Flight:
             outcome=self.outcome,
         )
 
-    def _begin_leg(self, drones: tuple[int, ...], team: Team, memory: dict[str, Vector]) -> None:
+    def _fresh_memory(self, team: Team, start: Start) -> dict[str, Vector]:
+        memory = {layer: getattr(self.mission, layer).memory(team) for layer in LAYERS[:-1]}
+        return {**memory, "plant": self.mission.plant.initial(team, start)}
+
+    def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
         """From here on these drones of the mission fly; every layer is bound to their team."""
         parts = {layer: getattr(self.mission, layer) for layer in LAYERS}
-        parts["allocation"] = self._allocation
+        parts["allocation"] = self._allocation.of(drones)
+        team = self.mission.team.of(drones)
         bus = make_bus(team.n)
         self._legs.append(
             _Leg(
                 first_step=self._step,
-                drones=list(drones),
+                drones=drones,
                 team=team,
                 bus=bus,
                 params=Vectors(*(parts[layer].params(team) for layer in LAYERS)),
@@ -165,35 +170,52 @@ class Flight:
         leg = self._legs[-1]
         if section == "load":
             self._set_load_mass(event.value)
-        elif section == "drones":
-            self._lose(leg.drones.index(event.value))
+        elif name == "lose":
+            self._regroup([drone for drone in leg.drones if drone != event.value])
+        elif name == "join":
+            self._regroup(sorted([*leg.drones, event.value]))
         else:
             self._allocation = self._allocation.model_copy(update={name: event.value})
-            leg.params.allocation[:] = self._allocation.params(leg.team)
+            leg.params.allocation[:] = self._allocation.of(leg.drones).params(leg.team)
 
     def _set_load_mass(self, mass: float) -> None:
         self._load_mass = mass
         leg = self._legs[-1]
         leg.params.plant[:] = self.mission.plant.params(replace(leg.team, load_mass=mass))
 
-    def _lose(self, place: int) -> None:
-        """Cut one cable: the drone at this place of the present leg leaves the team."""
+    def _regroup(self, drones: list[int]) -> None:
+        """Go on with these drones: who is missing has its cable cut, who is new hangs on a taut one."""
         old = self._legs[-1]
-        team = old.team.without(place)
+        team = self.mission.team.of(drones)
+        places = np.array([old.drones.index(d) if d in old.drones else -1 for d in drones])
+        stay, new = places[places >= 0], places < 0
+        directions = np.zeros((team.n, 3))
+        directions[~new] = old.bus.directions[stay]
+        for i in np.flatnonzero(new):
+            taken = directions[np.linalg.norm(directions, axis=1) > 0.0]
+            directions[i] = widest_gap(taken, np.radians(self.mission.start.cone_deg))
+        start = Start(
+            load_position=old.bus.load[0],
+            load_velocity=old.bus.load[1],
+            directions=directions,
+            attitudes=np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1)),
+        )
         memory = {
-            layer: getattr(self.mission, layer).memory_without(
-                team, getattr(old.memory, layer), place
+            layer: getattr(self.mission, layer).carry_over(
+                getattr(old.memory, layer), fresh, places
             )
-            for layer in LAYERS
+            for layer, fresh in self._fresh_memory(team, start).items()
         }
-        self._allocation = self._allocation.without(place)
-        self._begin_leg(tuple(np.delete(old.drones, place)), team, memory)
+        self._begin_leg(drones, memory)
         bus = self._legs[-1].bus
         for signal in SIGNALS:
-            kept = getattr(old.bus, signal.name)
+            now, before = getattr(bus, signal.name), getattr(old.bus, signal.name)
             if signal.shape[0] in {"n", "n+1"}:
-                kept = np.delete(kept, place, axis=0)
-            getattr(bus, signal.name)[:] = kept
+                now[: team.n][~new] = before[stay]
+                now[team.n :] = before[len(old.drones) :]
+            else:
+                now[:] = before
+        bus.desired_directions[new] = directions[new]
 
 
 @dataclass(frozen=True)
@@ -210,11 +232,12 @@ class _Leg:
 
 
 def start_state(mission: Mission) -> Start:
-    """At rest on the start formation, each drone's thrust holding its share of the load.
+    """Of the drones that fly at first: at rest on the start formation, each drone's thrust holding its share of the load.
 
     The attitude is the zero-yaw one for the static thrust, so that the flight starts in balance.
     """
-    team = mission.team
+    drones = mission.first_drones()
+    team = mission.team.of(drones)
     directions = mission.start_directions()
     first = mission.reference.sample(np.zeros(1), team)[0]
     weight = [0.0, 0.0, team.load_mass * team.gravity]
