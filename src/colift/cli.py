@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -221,10 +222,14 @@ def safety(
         emit(result)
         return
     for title, header, rows in module.tables(result):
-        table = Table(title=title, title_justify="left")
+        table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
         for k, name in enumerate(header):
             edge = k in (0, len(header) - 1)
-            table.add_column(name, justify="left" if edge else "right", no_wrap=not edge)
+            widest = max(len(row[k]) for row in rows) if edge else None
+            table.add_column(
+                name, justify="left" if edge else "right", no_wrap=not edge,
+                min_width=widest and min(widest, 16),
+            )  # fmt: skip
         for row in rows:
             table.add_row(*map(escape, row))
         out.print(table)

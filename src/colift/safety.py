@@ -381,11 +381,11 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[s
             "limit",
             "safe",
             "paper's",
-            "yields %",
-            "avoidable %",
+            "yield %",
+            "avoid %",
             "median",
             "p99",
-            "promises",
+            "limits",
         ],
         rows,
     )
@@ -404,6 +404,6 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[s
     ]
     yield (
         "In flight: actual angles in degrees (whole flight, after 5 s), tracking in cm, slack in s",
-        ["flight", "allocator", "angle", "later", "RMS", "max", "slack", "verdict"],
+        ["flight", "with", "angle", "later", "RMS", "max", "slack", "verdict"],
         rows,
     )

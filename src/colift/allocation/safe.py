@@ -252,8 +252,8 @@ class Safe(AllocatorPart):
     """Time with which directions settle at the optimum, s; tensions follow at once."""
     spread: Annotated[float, Field(ge=1e-6, le=1.0)] = 1e-2
     """Barrier between near cables, in squared shares of the load; more spreads them wider."""
-    barrier: Annotated[float, Field(ge=1e-8, le=0.1)] = 1e-3
-    """Barrier of all other limits, in squared shares of the load."""
+    barrier: Annotated[float, Field(ge=1e-7, le=0.1)] = 1e-3
+    """Barrier of all other limits, in squared shares of the load. Approach very small ones in steps."""
     tolerance: Annotated[float, Field(ge=1e-10, le=1e-3)] = 1e-6
     """KKT residual, in shares of the load, at which the iteration stops."""
     max_iterations: Annotated[int, Field(ge=2, le=200)] = 30
