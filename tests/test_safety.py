@@ -24,7 +24,7 @@ def test_every_limit_holds_in_every_cycle(n: int, family: str) -> None:
     assert found.smallest_angle >= found.least_angle - safety.ANGLE_TOLERANCE
     assert found.limits_broken_by <= 1e-6
     assert found.not_finite == 0
-    assert found.holds
+    assert found.unflagged_imbalance == 0
 
 
 @pytest.mark.parametrize("family", ["smooth", "noise", "coloured"])

@@ -70,8 +70,9 @@ def test_the_cone_stops_a_cable_that_its_turn_would_allow() -> None:
     assert not out_of_reach(-beyond[None], edge[None, None], low, high, TURN, CONE + TURN)[0]
 
 
-@pytest.mark.parametrize(("n", "family"), [(2, "noise"), (2, "steps"), (3, "steps"), (4, "steps")])
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.parametrize("family", ["noise", "steps", "adversary"])
 def test_force_is_given_up_only_where_no_allocator_could_give_it(n: int, family: str) -> None:
     found = safety.attack(n, family, 20_000, safety.problem(n)[1])
-    assert found.yield_share > found.avoidable_share
-    assert found.avoidable_share <= 5e-4
+    assert found.holds
+    assert found.avoidable_share <= (1e-3 if family == "adversary" else 5e-4)
