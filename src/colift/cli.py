@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
@@ -213,26 +213,11 @@ def safety(
         result = module.show_all(
             counts, cycles // (10 if quick else 1), quick=quick, progress=advance
         )
-    if file is not None:
-        from colift.recording import atomic_path
-
-        with atomic_path(file) as temporary:
-            temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
+    save_json(file, result)
     if as_json:
         emit(result)
         return
-    for title, header, rows in module.tables(result):
-        table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
-        for k, name in enumerate(header):
-            edge = k in (0, len(header) - 1)
-            widest = max(len(row[k]) for row in rows) if edge else None
-            table.add_column(
-                name, justify="left" if edge else "right", no_wrap=not edge,
-                min_width=widest and min(widest, 16),
-            )  # fmt: skip
-        for row in rows:
-            table.add_row(*map(escape, row))
-        out.print(table)
+    show_tables(module.tables(result))
 
 
 @app.command()
@@ -342,15 +327,55 @@ def bench(
         from colift import benchmark
     with progress("Timing") as advance:
         result = benchmark.run(counts, quick=quick, progress=advance)
+    save_json(file, result)
+    if as_json:
+        emit(result)
+    else:
+        benchmark.show(result, out)
+
+
+@app.command()
+def latency(
+    drones: Annotated[int, typer.Option(help="Number of drones.", min=2, max=64)] = 4,
+    seconds: Annotated[
+        float, typer.Option(help="Length of each of the six measurements, s.", min=1, max=3600)
+    ] = 60.0,
+    rate: Annotated[float, typer.Option(help="Calls per second.", min=10, max=10_000)] = 1000.0,
+    others: Annotated[
+        int | None, typer.Option(help="Busy processes meanwhile; default: one a core.", min=0)
+    ] = None,
+    realtime: Annotated[
+        bool, typer.Option(help="Under the real-time scheduler (Linux, with the right to).")
+    ] = False,
+    file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Call the allocators on a clock while other processes use the machine.
+
+    Tells late starts, Python's collector, the allocator's own time and preemption apart, from Python and
+    from a compiled loop.
+    """
+    with loading():
+        from colift import latency as module
+    with progress("Waiting for ticks") as advance:
+        result = module.run(
+            n=drones, seconds=seconds, rate=rate, others=others, realtime=realtime,
+            progress=advance,
+        )  # fmt: skip
+    save_json(file, result)
+    if as_json:
+        emit(result)
+    else:
+        show_tables(module.tables(result))
+
+
+def save_json(file: Path | None, result: Any) -> None:
+    """Write a result where the user asked for it, whole or not at all."""
     if file is not None:
         from colift.recording import atomic_path
 
         with atomic_path(file) as temporary:
             temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
-    if as_json:
-        emit(result)
-    else:
-        benchmark.show(result, out)
 
 
 def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
@@ -383,6 +408,22 @@ def numbers(text: str, least: int, most: int) -> list[int]:
     if any(not least <= n <= most for n in found):
         raise typer.BadParameter(f"each number of drones must be between {least} and {most}")
     return found
+
+
+def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
+    """Print titled tables of text; the first and the last column may wrap."""
+    for title, header, rows in tables:
+        table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
+        for k, name in enumerate(header):
+            edge = k in (0, len(header) - 1)
+            widest = max(len(row[k]) for row in rows) if edge else None
+            table.add_column(
+                name, justify="left" if edge else "right", no_wrap=not edge,
+                min_width=widest and min(widest, 16),
+            )  # fmt: skip
+        for row in rows:
+            table.add_row(*map(escape, row))
+        out.print(table)
 
 
 def plain(value: Any) -> Any:

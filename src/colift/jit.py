@@ -13,6 +13,7 @@ import hashlib
 import os
 import shutil
 import stat
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -126,33 +127,44 @@ def monotonic_ns() -> int:
     return time.perf_counter_ns()
 
 
-@intrinsic
-def _clock_gettime_ns(typingctx: Any) -> Any:
-    """`clock_gettime(CLOCK_MONOTONIC)` by symbol name, which keeps the cache of kernels valid."""
-    import sys
+def thread_time_ns() -> int:
+    """Processor time of this thread in nanoseconds, usable inside kernels (and in plain Python)."""
+    return time.thread_time_ns()
 
-    clock_id = 6 if sys.platform == "darwin" else 1
 
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        i64, i32 = ir.IntType(64), ir.IntType(32)
-        timespec = cgutils.alloca_once(builder, ir.ArrayType(i64, 2))
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(i32, [i32, timespec.type]), "clock_gettime"
-        )
-        builder.call(function, [i32(clock_id), timespec])
-        seconds = builder.load(cgutils.gep_inbounds(builder, timespec, 0, 0))
-        nanoseconds = builder.load(cgutils.gep_inbounds(builder, timespec, 0, 1))
-        return builder.add(builder.mul(seconds, i64(1_000_000_000)), nanoseconds)
+def _clock(linux: int, darwin: int) -> Any:
+    """`clock_gettime` of one clock by symbol name, which keeps the cache of kernels valid."""
+    clock_id = darwin if sys.platform == "darwin" else linux
 
-    return types.int64(), codegen
+    @intrinsic
+    def read(typingctx: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            i64, i32 = ir.IntType(64), ir.IntType(32)
+            timespec = cgutils.alloca_once(builder, ir.ArrayType(i64, 2))
+            function = cgutils.get_or_insert_function(
+                builder.module, ir.FunctionType(i32, [i32, timespec.type]), "clock_gettime"
+            )
+            builder.call(function, [i32(clock_id), timespec])
+            seconds = builder.load(cgutils.gep_inbounds(builder, timespec, 0, 0))
+            nanoseconds = builder.load(cgutils.gep_inbounds(builder, timespec, 0, 1))
+            return builder.add(builder.mul(seconds, i64(1_000_000_000)), nanoseconds)
+
+        return types.int64(), codegen
+
+    return read
+
+
+_read_monotonic, _read_thread = _clock(linux=1, darwin=6), _clock(linux=3, darwin=16)
 
 
 @overload(monotonic_ns)
 def _monotonic_ns_overload() -> Any:
-    def implementation() -> Any:
-        return _clock_gettime_ns()  # type: ignore[call-arg]
+    return lambda: _read_monotonic()
 
-    return implementation
+
+@overload(thread_time_ns)
+def _thread_time_ns_overload() -> Any:
+    return lambda: _read_thread()
 
 
 def compiled_before() -> bool:
