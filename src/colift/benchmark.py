@@ -24,6 +24,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from colift.allocation._oracle import TensionProblem
 from colift.allocation.base import INFO_SIZE, SIGNATURE
 from colift.allocation.sqp import Sqp, SqpAllocator
 from colift.geometry import Array, ring
@@ -134,48 +135,17 @@ def slsqp(n: int, calls: int) -> dict[str, float] | None:
     except ImportError:
         return None
     mu = scaled_problem(n)[1]
-    settings = Sqp(mu=mu)
     ours = SqpAllocator(n, mu)
     forces = smooth_forces(n, calls)
-    identity = np.eye(3)
-
-    def objective(z: Array) -> float:
-        return settings.objective(z[:n], z[n:].reshape(n, 3))
-
-    def gradient(z: Array) -> Array:
-        alpha = z[n:].reshape(n, 3)
-        squares = np.sum(alpha * alpha, axis=1, keepdims=True)
-        slope = 2.0 * mu * (alpha @ (alpha.T @ alpha) - squares * alpha)
-        return np.concatenate([z[:n], slope.ravel()])
-
-    def balance_jacobian(z: Array) -> Array:
-        alpha = z[n:].reshape(n, 3)
-        return np.hstack([alpha.T, np.kron(z[:n], identity)])
-
-    def norm_jacobian(z: Array) -> Array:
-        rows = np.zeros((n, 4 * n))
-        for i in range(n):
-            rows[i, n + 3 * i : n + 3 * i + 3] = 2.0 * z[n + 3 * i : n + 3 * i + 3]
-        return rows
-
     first = ours.allocate(forces[0])
     z = np.concatenate([first.tensions, first.directions.ravel()])
     durations, excess, failures = [], [], 0
     for force in forces:
-
-        def balance(z: Array, force: Array = force) -> Array:
-            return np.asarray(z[:n] @ z[n:].reshape(n, 3) + force)
-
-        def norms(z: Array) -> Array:
-            return np.asarray(np.sum(z[n:].reshape(n, 3) ** 2, axis=1) - 1.0)
-
+        asked = TensionProblem(n, mu, force)
         begin = time.perf_counter()
         answer = minimize(
-            objective, z, jac=gradient, method="SLSQP", bounds=[(0, None)] * n + [(None, None)] * (3 * n),
-            constraints=[
-                {"type": "eq", "fun": balance, "jac": balance_jacobian},
-                {"type": "eq", "fun": norms, "jac": norm_jacobian},
-            ],
+            asked.objective, z, jac=asked.gradient, method="SLSQP", bounds=asked.bounds(),
+            constraints=[{"type": "eq", "fun": asked.equalities, "jac": asked.equalities_jacobian}],
             options={"ftol": 1e-10, "maxiter": 300},
         )  # fmt: skip
         durations.append(time.perf_counter() - begin)

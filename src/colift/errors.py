@@ -47,5 +47,9 @@ class MissionError(ColiftError):
         super().__init__(f"{source}: {count}\n{lines}")
 
 
+class MissingExtraError(ColiftError):
+    """A part calls a package that is not installed; the message names the extra that brings it."""
+
+
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""

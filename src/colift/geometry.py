@@ -22,6 +22,24 @@ def ring(n: int, cone: float, *, heading: float = 0.0) -> Array:
     )
 
 
+def rotation_between(a: Array, b: Array) -> Array:
+    """Matrix (3, 3) of the smallest rotation from the unit vector ``a`` to the unit vector ``b``."""
+    c = float(a @ b)
+    if c > -0.999:
+        v = np.cross(a, b)
+        return np.asarray(
+            np.eye(3) + _cross_matrix(v) + _cross_matrix(v) @ _cross_matrix(v) / (1.0 + c)
+        )
+    across = np.eye(3)[int(np.argmin(np.abs(a)))]
+    half = across - (across @ a) * a  # turn a to its opposite about this axis, then the rest
+    half /= np.linalg.norm(half)
+    return rotation_between(-a, b) @ (2.0 * np.outer(half, half) - np.eye(3))
+
+
+def _cross_matrix(v: Array) -> Array:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
 def pairwise_angles(directions: Array) -> Array:
     """Angles (..., n(n-1)/2) between all pairs of cables, rad, from directions (..., n, 3)."""
     i, j = np.triu_indices(directions.shape[-2], k=1)

@@ -50,6 +50,8 @@ class Part(BaseModel):
 
     layer: ClassVar[str]
     kernel: ClassVar[Callable[..., Any]]
+    needs: ClassVar[tuple[str, str] | None] = None
+    """Package beyond colift's own that the kernel calls, and the extra that installs it."""
 
     def params(self, team: Team) -> Vector:
         """Parameter vector of the kernel; constant between two calls of the kernel."""
@@ -68,6 +70,14 @@ class Part(BaseModel):
         overrides this, mostly with :func:`carry_rows`.
         """
         return old if fresh.size == old.size else fresh
+
+    @classmethod
+    def missing(cls) -> str:
+        """What is missing for the part to work and how to get it; empty when nothing is."""
+        if cls.needs is None or importlib.util.find_spec(cls.needs[0]) is not None:
+            return ""
+        package, extra = cls.needs
+        return f"needs the package {package}: pip install 'colift[{extra}]'"
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""

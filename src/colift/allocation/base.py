@@ -59,6 +59,8 @@ class Status(enum.IntEnum):
     """The limits do not allow the whole force: the nearest allowed one, horizontal part given up first."""
     RECOVERING = 7
     """The start broke a limit: the cables are on their way back, none worse than it was."""
+    PUSHING = 8
+    """A tension came out negative and is shown on the opposite side: a drone below the load."""
 
     @property
     def ok(self) -> bool:

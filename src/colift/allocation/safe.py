@@ -14,6 +14,7 @@ from colift.allocation import _feasibility as feasible
 from colift.allocation import _safe_cycle as cycle
 from colift.allocation import _safe_newton as newton
 from colift.allocation import _sqp_newton as paper
+from colift.allocation._oracle import paper_objective
 from colift.allocation.base import (
     INFO_ACTIVE,
     INFO_BALANCE,
@@ -357,12 +358,10 @@ class Safe(AllocatorPart):
         return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 9)
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
-        gram = directions @ directions.T
-        pairs = 0.5 * (np.sum(gram * gram) - len(tensions))
         mu = self.mu
         if self.mu_scaling == "weight":
             mu *= float(np.sum((tensions @ directions) ** 2)) / self.mu_force**2
-        return float(0.5 * np.sum(self.weights * tensions**2) + mu * pairs)
+        return paper_objective(mu, np.sqrt(self.weights) * tensions, directions)
 
 
 class SafeAllocator(Allocator):

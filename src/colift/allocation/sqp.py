@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from colift.allocation import _sqp_newton as newton
+from colift.allocation._oracle import paper_objective
 from colift.allocation.base import (
     INFO_BALANCE,
     INFO_GAP,
@@ -146,9 +147,7 @@ class Sqp(AllocatorPart):
         return np.zeros(_HEAD + 4 * team.n + newton.workspace_size(team.n))
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
-        gram = directions @ directions.T
-        pairs = 0.5 * (np.sum(gram * gram) - len(tensions))
-        return float(0.5 * tensions @ tensions + self.mu * pairs)
+        return paper_objective(self.mu, tensions, directions)
 
 
 class SqpAllocator(Allocator):

@@ -253,6 +253,8 @@ def _cross_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
                 yield Problem(f"events.{i}", problem.value, f"{problem.path} {problem.message}")
     if not broken & {"world", "load", "drones"}:
         for layer, part in parts.items():
+            if message := part.missing():
+                yield Problem(f"{layer}.kind", "", message)
             for field, message in part.check(frame.team):
                 yield Problem(f"{layer}.{field}", "", message)
 

@@ -1,0 +1,39 @@
+"""An allocator of your own in one file: the formation stands still, fresh batteries carry more.
+
+colift run --with examples/my_allocator.py --set allocation.kind=my-allocator \
+    --set "allocation.charge=[1.0, 0.5, 1.0, 0.8]"
+"""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.allocation.base import AllocatorPart, Status
+
+
+def share(force, acceleration, dt, params, memory, tensions, directions, info):
+    """Least ``sum T_i^2 / charge_i`` along the directions that the flight starts with."""
+    if not np.isfinite(force @ force):
+        return Status.INVALID_FORCE
+    weighted = params[:, None] * directions
+    tensions[:] = -weighted @ np.linalg.pinv(directions.T @ weighted) @ force
+    np.maximum(tensions, 0.0, out=tensions)  # a cable cannot push
+    info[:] = 0.0, np.nan, np.nan, np.nan, np.linalg.norm(tensions @ directions + force), 0.0
+    return Status.CONVERGED if info[4] <= 1e-9 * np.linalg.norm(force) else Status.CLAMPED
+
+
+class ChargeWeighted(AllocatorPart):
+    """Tensions along a formation at rest, by the charge of each drone's battery."""
+
+    kernel = share
+
+    charge: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = (1.0,)
+    """Charge of each drone's battery; one value stands for all."""
+
+    def params(self, team):
+        return np.resize(np.array(self.charge), team.n)
+
+    def of(self, drones):
+        chosen = self.charge if len(self.charge) == 1 else [self.charge[i] for i in drones]
+        return self.model_copy(update={"charge": tuple(chosen)})

@@ -1,0 +1,42 @@
+"""SciPy's SLSQP on the paper's problem: a slow, independent answer to compare with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colift.allocation._oracle import Oracle, outcome_of, tension_problem
+from colift.allocation._plain import Outcome, Problem, plain_kernel
+
+
+def _solve(problem: Problem) -> Outcome:
+    from scipy.optimize import minimize
+
+    asked = tension_problem(problem)
+    tolerance, iterations = float(problem.params[1]), int(problem.params[2])
+    scale = 1.0 / max(1.0, asked.mu)
+    answer = minimize(
+        lambda z: scale * asked.objective(z),
+        np.concatenate([problem.shares, problem.directions.ravel()]),
+        jac=lambda z: scale * asked.gradient(z),
+        method="SLSQP",
+        bounds=asked.bounds(),
+        constraints=[
+            {"type": "eq", "fun": asked.equalities, "jac": asked.equalities_jacobian},
+            {"type": "ineq", "fun": asked.inequalities, "jac": asked.inequalities_jacobian},
+        ][: 2 if asked.limits.pairs or asked.limits.cone else 1],
+        options={"ftol": tolerance * tolerance, "maxiter": iterations},
+    )
+    return outcome_of(asked, np.asarray(answer.x), tolerance, int(answer.nit))
+
+
+class Slsqp(Oracle):
+    """The paper's problem by SciPy's sequential least-squares programming, warm-started.
+
+    Kraft, "A software package for sequential quadratic programming", DFVLR-FB 88-28, 1988. An oracle:
+    some thousand times slower than ``sqp``. The limits that may be added are those of ``safe``, in every
+    answer that is ``CONVERGED``; where they cannot hold the status is ``NUMERICAL_FAILURE`` and the last
+    directions are kept.
+    """
+
+    kernel = plain_kernel(_solve)
+    needs = ("scipy", "solvers")
