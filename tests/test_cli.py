@@ -163,7 +163,7 @@ def test_an_allocator_in_a_file_of_ones_own_flies(tmp_path: Path) -> None:
 def test_two_flights_of_one_second_do_not_share_a_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from colift.cli import new_folder
+    from colift.cli.base import new_folder
 
     monkeypatch.chdir(tmp_path)
     assert len({new_folder("hover") for _ in range(20)}) == 20

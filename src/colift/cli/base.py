@@ -1,0 +1,170 @@
+"""What the commands share: the application, common options, progress, tables and result files."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from colift.simulation.flight import Progress as Report
+
+EXIT_ERROR = 1
+EXIT_USAGE = 2
+EXIT_DIVERGED = 3
+EXIT_INTERRUPTED = 130
+
+app = typer.Typer(
+    name="colift",
+    help="Several multirotors carry one load on cables: allocate, control, simulate, judge.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+out = Console()
+err = Console(stderr=True)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change any field of the mission, e.g. allocation.mu=0.75.",
+    ),
+]
+With = Annotated[
+    list[Path] | None,
+    typer.Option("--with", metavar="FILE", help="Python file with parts of your own to use."),
+]
+
+
+def save_json(file: Path | None, result: Any) -> None:
+    """Write a result where the user asked for it, whole or not at all."""
+    if file is not None:
+        from colift.recording import atomic_path
+
+        with atomic_path(file) as temporary:
+            temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
+
+
+def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
+    """Recording, metrics, resolved mission and report of one run, each written atomically."""
+    import tomli_w
+
+    from colift.recording import atomic_path
+
+    files = {"recording": flown.recording.save(folder / "recording.h5")}
+    for name, text in (
+        ("metrics", json.dumps(plain(flown.metrics), indent=2) + "\n"),
+        ("mission", tomli_w.dumps(flown.mission.resolved())),
+    ):
+        files[name] = folder / ("metrics.json" if name == "metrics" else "mission.toml")
+        with atomic_path(files[name]) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    if report:
+        from colift.report.html import write_report
+
+        files["report"] = write_report(flown.recording, folder, metrics=flown.metrics)
+    return files
+
+
+def numbers(text: str, least: int, most: int) -> list[int]:
+    """A list of whole numbers, separated by commas."""
+    try:
+        found = [int(item) for item in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a list of whole numbers") from None
+    if any(not least <= n <= most for n in found):
+        raise typer.BadParameter(f"each number of drones must be between {least} and {most}")
+    return found
+
+
+def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
+    """Print titled tables of text; the first and the last column may wrap."""
+    for title, header, rows in tables:
+        table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
+        for k, name in enumerate(header):
+            edge = k in (0, len(header) - 1)
+            widest = max(len(row[k]) for row in rows) if edge else None
+            table.add_column(
+                name, justify="left" if edge else "right", no_wrap=not edge,
+                min_width=widest and min(widest, 16),
+            )  # fmt: skip
+        for row in rows:
+            table.add_row(*map(escape, row))
+        out.print(table)
+
+
+def plain(value: Any) -> Any:
+    """JSON-ready copy; a number that is not finite becomes null."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def emit(value: Any) -> None:
+    """Print one JSON object on standard output."""
+    print(json.dumps(plain(value), indent=2))
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Say so while compiled parts are loaded, which takes half a minute the first time."""
+    from colift.jit import compiled_before
+
+    if compiled_before():
+        yield
+        return
+    err.print("First run on this machine: compiling (about half a minute, then cached).")
+    with err.status("compiling"):
+        yield
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Report]:
+    """A progress bar on a terminal; silent elsewhere."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+        task = bar.add_task(escape(title), total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+def new_folder(name: str) -> Path:
+    """Make ``runs/NAME-DATE-TIME``, numbered where flights of the same second would share it."""
+    stem = f"{_slug(name)}-{datetime.now():%Y%m%d-%H%M%S}"
+    folder, number = Path("runs") / stem, 1
+    folder.parent.mkdir(exist_ok=True)
+    while True:
+        try:
+            folder.mkdir()
+            return folder
+        except FileExistsError:
+            number += 1
+            folder = folder.with_name(f"{stem}-{number}")
+
+
+def _slug(name: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)[:60]

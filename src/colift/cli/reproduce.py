@@ -1,0 +1,50 @@
+"""`colift reproduce`: reproduce the paper's figures and numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from colift.cli.base import Json, app, emit, loading, new_folder, out, progress
+
+
+@app.command()
+def reproduce(
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/reproduce-DATE-TIME"),
+    ] = None,
+    report: Annotated[bool, typer.Option(help="Write the HTML page and its figures.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Fly everything in the paper and set our figures beside the printed ones.
+
+    Each row ends in a verdict: reproduced, better, or differs because of a named reason. The
+    paper's errata are each demonstrated by a flight or a computation.
+    """
+    with loading():
+        from colift import reproduction
+    with progress("Reproducing the paper") as advance:
+        result = reproduction.reproduce(advance)
+    target = folder or new_folder("reproduce")
+    files = reproduction.write(result, target, report=report)
+    if as_json:
+        emit({**result.as_dict(), "files": {name: str(path) for name, path in files.items()}})
+        return
+    for section, rows in result.sections():
+        table = Table(title=section, title_justify="left", show_lines=True)
+        table.add_column("quantity", ratio=3)
+        table.add_column("paper", justify="right")
+        table.add_column("ours", justify="right")
+        table.add_column("verdict", ratio=4)
+        for row in rows:
+            table.add_row(
+                escape(row.quantity), row.paper_text, row.ours_text, escape(row.verdict_text)
+            )
+        out.print(table)
+    for name, path in files.items():
+        out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)

@@ -1,0 +1,103 @@
+"""`colift run`: fly a mission."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from colift.cli.base import (
+    EXIT_DIVERGED,
+    Json,
+    Sets,
+    With,
+    app,
+    emit,
+    loading,
+    new_folder,
+    out,
+    progress,
+    write_results,
+)
+
+
+@app.command()
+def run(
+    mission: Annotated[
+        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
+    ] = "paper-spiral",
+    sets: Sets = None,
+    seed: Annotated[int | None, typer.Option(help="Seed instead of the mission's.")] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/MISSION-DATE-TIME"),
+    ] = None,
+    extra: With = None,
+    report: Annotated[bool, typer.Option(help="Write the HTML report and its figures.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Fly a mission; print what happened; write recording, metrics and report.
+
+    [bold]Examples[/bold]
+
+      colift run
+      colift run figure-eight --set allocation.mu=0.75 --set timing.duration=60
+      colift run my-mission.toml --out results/first --json
+    """
+    from colift.mission.load import parse_override
+
+    with loading():
+        import colift
+        from colift import metrics
+        from colift.part import load_file
+
+        for path in extra or []:
+            load_file(path)
+        overrides = dict(parse_override(text) for text in sets or [])
+        loaded = colift.load_mission(
+            mission, {**overrides, **({} if seed is None else {"seed": seed})}
+        )
+    with progress(f"Flying {loaded.name}") as advance:
+        flown = colift.run(loaded, progress=advance)
+    target = folder or new_folder(loaded.name)
+    files = write_results(flown, target, report=report)
+    if as_json:
+        emit(
+            {
+                "mission": loaded.name,
+                "outcome": flown.recording.outcome,
+                "summary": metrics.verdict(flown.recording, flown.metrics)[1],
+                "metrics": flown.metrics,
+                "loop_time_s": flown.loop_time,
+                "compiled": flown.compiled,
+                "files": {name: str(path) for name, path in files.items()},
+            }
+        )
+    else:
+        table = Table(
+            title=escape(f"{loaded.name}: {flown.recording.outcome}"), title_justify="left"
+        )
+        table.add_column("metric")
+        table.add_column("value", justify="right")
+        table.add_column("unit")
+        table.add_column("meaning", style="dim")
+        for metric in metrics.all_metrics():
+            value = f"{flown.metrics[metric.name]:.5g}"
+            table.add_row(metric.name, value, metric.unit, metric.meaning)
+        out.print(table)
+        level, sentence = metrics.verdict(flown.recording, flown.metrics)
+        colour = {"good": "green", "warn": "yellow", "bad": "red"}[level]
+        out.print(f"[{colour}]{escape(sentence)}[/{colour}]")
+        simulated = loaded.timing.duration
+        how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
+        out.print(
+            f"{simulated:g} s of flight in {flown.loop_time:.3f} s ({how}, "
+            f"{simulated / flown.loop_time:.0f} times real time)."
+        )
+        for name, path in files.items():
+            out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+    if flown.recording.outcome != "completed":
+        raise typer.Exit(EXIT_DIVERGED)
