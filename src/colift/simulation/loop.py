@@ -171,6 +171,7 @@ def advance(  # type: ignore[no-untyped-def]
             bus.thrusts,
             bus.torques,
             bus.external_forces,
+            bus.attached,
             dt,
             params.plant,
             memory.plant,

@@ -28,6 +28,8 @@ class Signal:
     symbol: str
     frame: str
     meaning: str
+    initial: float = 0.0
+    """Value until the first writer."""
 
     def shape_for(self, n: int) -> tuple[int, ...]:
         """Shape with the number of drones filled in."""
@@ -54,6 +56,7 @@ SIGNALS = (
     Signal("desired_rates", ("n", 3), "rad/s", "Omega_id", "body", "wanted body rates"),
     Signal("torques", ("n", 3), "N m", "tau_i", "body", "torque commands"),
     Signal("external_forces", ("n+1", 3), "N", "d", "world", "disturbing forces on the drones and, last row, the load"),
+    Signal("attached", ("n",), "1", "-", "-", "1 while a cable holds, 0 once it is cut", initial=1.0),
     Signal("slack_times", ("n",), "s", "-", "-", "time that each cable has spent without tension"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
@@ -100,6 +103,7 @@ class Bus(NamedTuple):
     desired_rates: Array
     torques: Array
     external_forces: Array
+    attached: Array
     slack_times: Array
 
 
@@ -120,8 +124,10 @@ def columns(n: int) -> dict[str, slice]:
 
 
 def make_bus(n: int) -> Bus:
-    """A bus of zeros for n drones."""
+    """A bus for n drones, every signal at its initial value."""
     where = columns(n)
     row = np.zeros(max(part.stop for part in where.values()))
     views = {s.name: row[where[s.name]].reshape(s.shape_for(n)) for s in SIGNALS}
+    for s in SIGNALS:
+        views[s.name][:] = s.initial
     return Bus(row=row, **views)
