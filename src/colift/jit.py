@@ -16,7 +16,6 @@ import stat
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -28,11 +27,6 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
-
-# Kernels as arguments of the loop are what this package is built on; no news to its users.
-warnings.filterwarnings(
-    "ignore", "First-class function type", numba.core.errors.NumbaExperimentalFeatureWarning
-)
 
 config: Any = numba.config
 F = TypeVar("F", bound=Callable[..., Any])

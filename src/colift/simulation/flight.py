@@ -251,8 +251,8 @@ class Flight:
         cycles = np.zeros((_due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
         begin = time.perf_counter()
         reached = loop(
-            self._step, stop, every, self._keys, *leg.kernels, *leg.disturbances, leg.params,
-            leg.memory, self._info, leg.bus, log, cycles,
+            self._step, stop, every, self._keys, *leg.kernels, *leg.disturbances.arguments(),
+            leg.params, leg.memory, self._info, leg.bus, log, cycles,
         )  # fmt: skip
         self.loop_time += time.perf_counter() - begin
         leg.log.append(log[: _due_rows(self._step, reached, every.recording)])

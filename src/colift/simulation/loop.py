@@ -100,6 +100,10 @@ class Disturbances(NamedTuple):
     params: tuple[Array, ...]
     memory: tuple[Array, ...]
 
+    def arguments(self) -> tuple[Any, ...]:
+        """As the loop takes them."""
+        return self.number, *self.kernels, self.keys, self.params, self.memory
+
     @classmethod
     def of(cls, each: Sequence[tuple[Any, int, Array, Array]]) -> Disturbances:
         """From kernel, key, parameters and memory of each."""
@@ -116,10 +120,6 @@ CYCLE_WIDTH = len(CYCLE_SIGNALS)
 _SILENT = int(Status.SILENT)
 
 
-def _places(item: Any) -> Any:
-    return types.UniTuple(item, MAX_DISTURBANCES)
-
-
 SIGNATURE = i8(
     i8,
     i8,
@@ -131,10 +131,10 @@ SIGNATURE = i8(
         for signature in functions.values()
     ),
     i8,
-    _places(types.FunctionType(disturbance.SIGNATURE)),
-    _places(i8),
-    _places(vector),
-    _places(vector),
+    *[types.FunctionType(disturbance.SIGNATURE)] * MAX_DISTURBANCES,
+    types.UniTuple(i8, MAX_DISTURBANCES),
+    types.UniTuple(vector, MAX_DISTURBANCES),
+    types.UniTuple(vector, MAX_DISTURBANCES),
     VECTORS_TYPE,
     VECTORS_TYPE,
     vector,
@@ -163,7 +163,14 @@ def advance(  # type: ignore[no-untyped-def]
     observe,
     step,
     disturbances,
-    disturb,
+    disturb_0,
+    disturb_1,
+    disturb_2,
+    disturb_3,
+    disturb_4,
+    disturb_5,
+    disturb_6,
+    disturb_7,
     disturbance_keys,
     disturbance_params,
     disturbance_memory,
@@ -179,6 +186,9 @@ def advance(  # type: ignore[no-untyped-def]
     It ends early, after a whole step, when a drone is judged lost: the caller regroups. The rows of ``log`` and
     ``cycles`` are those due from ``first`` on.
     """
+    disturb = (
+        disturb_0, disturb_1, disturb_2, disturb_3, disturb_4, disturb_5, disturb_6, disturb_7
+    )  # fmt: skip
     dt = every.step
     n = bus.tensions.shape[0]
     first_row = (first + every.recording - 1) // every.recording

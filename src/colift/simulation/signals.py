@@ -28,6 +28,8 @@ class Signal:
     symbol: str
     frame: str
     meaning: str
+    initial: float = 0.0
+    """Value until the first writer."""
 
     def shape_for(self, n: int) -> tuple[int, ...]:
         """Shape with the number of drones filled in."""
@@ -54,6 +56,7 @@ SIGNALS = (
     Signal("desired_rates", ("n", 3), "rad/s", "Omega_id", "body", "wanted body rates"),
     Signal("torques", ("n", 3), "N m", "tau_i", "body", "torque commands"),
     Signal("external_forces", ("n+1", 3), "N", "d", "world", "disturbing forces on the drones and, last row, the load"),
+    Signal("attached", ("n",), "1", "-", "-", "1 while a cable holds, 0 once it is cut", initial=1.0),
     Signal("slack_times", ("n",), "s", "-", "-", "time that each cable has spent without tension"),
     Signal("measured_load", (2, 3), "m, m/s", "-", "world", "load position and velocity as measured"),
     Signal("measured_positions", ("n", 3), "m", "-", "world", "drone positions as measured"),
@@ -70,16 +73,15 @@ SIGNALS = (
     Signal("applied_thrusts", ("n",), "N", "-", "-", "thrusts that act"),
     Signal("applied_torques", ("n", 3), "N m", "-", "body", "torques that act"),
     Signal("wind", (3,), "m/s", "-", "world", "velocity of the air"),
-    Signal("carrying", ("n",), "1", "-", "-", "1 for a drone that is taken to carry, 0 once it is judged lost"),
-    Signal("attached", ("n",), "1", "-", "-", "1 where the cable holds, 0 where it is cut"),
-    Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives"),
+    Signal("carrying", ("n",), "1", "-", "-", "1 for a drone that is taken to carry, 0 once it is judged lost", initial=1.0),
+    Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives", initial=1.0),
     Signal("stuck", ("n+1",), "1", "-", "-", "1 where the sensors of a drone or, last, the load repeat their last value"),
-    Signal("allocator_up", (1,), "1", "-", "-", "1 where the allocator answers, 0 where it is silent"),
+    Signal("allocator_up", (1,), "1", "-", "-", "1 where the allocator answers, 0 where it is silent", initial=1.0),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 
-CONDITIONS = {"attached": 1.0, "motor_health": 1.0, "stuck": 0.0, "allocator_up": 1.0}
-"""Signals that say what still works, with their value where all is well; faults change them."""
+CONDITIONS = ("attached", "motor_health", "stuck", "allocator_up")
+"""Signals that say what still works; faults change them."""
 
 CYCLE_SIGNALS = (
     Signal("allocator_status", (), "1", "-", "-", "status code of each allocation"),
@@ -123,6 +125,7 @@ class Bus(NamedTuple):
     desired_rates: Array
     torques: Array
     external_forces: Array
+    attached: Array
     slack_times: Array
     measured_load: Array
     measured_positions: Array
@@ -140,7 +143,6 @@ class Bus(NamedTuple):
     applied_torques: Array
     wind: Array
     carrying: Array
-    attached: Array
     motor_health: Array
     stuck: Array
     allocator_up: Array
@@ -163,10 +165,10 @@ def columns(n: int) -> dict[str, slice]:
 
 
 def make_bus(n: int) -> Bus:
-    """A bus for n drones: zeros, and everything works."""
+    """A bus for n drones, every signal at its initial value."""
     where = columns(n)
     row = np.zeros(max(part.stop for part in where.values()))
     views = {s.name: row[where[s.name]].reshape(s.shape_for(n)) for s in SIGNALS}
-    for name, value in {**CONDITIONS, "carrying": 1.0}.items():
-        views[name][...] = value
+    for s in SIGNALS:
+        views[s.name][:] = s.initial
     return Bus(row=row, **views)
