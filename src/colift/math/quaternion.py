@@ -38,3 +38,12 @@ def from_thrust_direction(ux, uy, uz):  # type: ignore[no-untyped-def]
         return (0.0, 1.0, 0.0, 0.0)
     root = math.sqrt(squared)
     return (0.5 * root, -uy / root, ux / root, 0.0)
+
+
+@inline
+def turn(w, x, y, z, ax, ay, az):  # type: ignore[no-untyped-def]
+    """The attitude turned by the rotation vector a (rad) of the body frame; exact, unit length kept."""
+    angle = math.sqrt(ax * ax + ay * ay + az * az)
+    half = math.cos(0.5 * angle)
+    scale = math.sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+    return multiply(w, x, y, z, half, scale * ax, scale * ay, scale * az)

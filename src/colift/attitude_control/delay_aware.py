@@ -1,0 +1,104 @@
+"""The paper's attitude law at gains that the delay allows, on the attitude predicted past the delay."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.attitude_control.base import SIGNATURE, AttitudeControlPart
+from colift.jit import inline, kernel
+from colift.math import quaternion
+from colift.part import Places, Vector, carry_rows
+from colift.team import Team
+from colift.tuning import Delays
+
+_HEAD = (
+    4  # params: predicted delay, lag, rho, most angular acceleration; then J, K_d (3 each a drone)
+)
+_MOST = 64  # control periods that a predicted delay may last
+_SLOTS = 3 * _MOST + 3  # memory per drone: past torques, newest first; the torque that acts (3)
+
+
+@inline
+def _spin(params, c, tx, ty, tz, p, q, r):  # type: ignore[no-untyped-def]
+    """Angular acceleration of a drone, body frame, by Euler's equations."""
+    jx, jy, jz = params[c], params[c + 1], params[c + 2]
+    return (
+        (tx - (jz - jy) * q * r) / jx,
+        (ty - (jx - jz) * r * p) / jy,
+        (tz - (jy - jx) * p * q) / jz,
+    )
+
+
+@kernel(SIGNATURE)
+def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: ignore[no-untyped-def]
+    n = q.shape[0]
+    span, rho = params[0], params[2]
+    # Whole periods of the delay, and what is left over of one more.
+    whole = min(int(span / dt + 1e-9), _MOST - 1)
+    rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
+    keep = math.exp(-dt / params[1]) if params[1] > 0.0 else 0.0
+    for i in range(n):
+        c = _HEAD + 6 * i
+        o = _SLOTS * i
+        act = o + 3 * _MOST
+        w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        rx, ry, rz = Omega[i, 0], Omega[i, 1], Omega[i, 2]
+        for j in range(whole, -1, -1):
+            step = rest if j == whole else dt
+            if step > 1e-12:
+                # Half a step of the rates, the turn by the rate in the middle, the whole step.
+                tx, ty, tz = memory[o + 3 * j], memory[o + 3 * j + 1], memory[o + 3 * j + 2]
+                ax, ay, az = _spin(params, c, tx, ty, tz, rx, ry, rz)
+                mx, my, mz = rx + 0.5 * step * ax, ry + 0.5 * step * ay, rz + 0.5 * step * az
+                ax, ay, az = _spin(params, c, tx, ty, tz, mx, my, mz)
+                rx, ry, rz = rx + step * ax, ry + step * ay, rz + step * az
+                w, x, y, z = quaternion.turn(w, x, y, z, mx * step, my * step, mz * step)
+        ew, ex, ey, ez = quaternion.multiply(
+            q_d[i, 0], -q_d[i, 1], -q_d[i, 2], -q_d[i, 3], w, x, y, z
+        )
+        # q and -q are one attitude: take the short way round.
+        sign = -1.0 if ew < 0.0 else 1.0
+        errors = (sign * ex, sign * ey, sign * ez)
+        turning = (rx, ry, rz)
+        for j in range(min(whole + 1, _MOST - 1), 0, -1):
+            for k in range(3):
+                memory[o + 3 * j + k] = memory[o + 3 * (j - 1) + k]
+        for k in range(3):
+            s = turning[k] - Omega_d[i, k] + rho * errors[k]
+            J, K_d = params[c + k], params[c + 3 + k]
+            limit = J * params[3]
+            tau[i, k] = min(max(-K_d * s, -limit), limit)
+            # What acts in the coming period: behind the motors' lag.
+            memory[act + k] = keep * memory[act + k] + (1.0 - keep) * tau[i, k]
+            memory[o + k] = memory[act + k]
+
+
+class DelayAware(AttitudeControlPart, Delays):
+    """``tau = -K_d (Omega_e + rho q_e)`` with gains from the delay, on a predicted attitude.
+
+    The paper's law without its robust term (eqs. 11 to 13). With ``predicted``, attitude and rate are carried
+    forward over ``delay`` by Euler's equations and the torques that were commanded meanwhile: a Smith
+    predictor in state space (Manitius and Olbrot 1979, "finite spectrum assignment").
+    """
+
+    kernel = _delay_aware
+
+    max_angular_acceleration: Annotated[float, Field(gt=0.0)] = 60.0
+    """Most torque over moment of inertia, about each axis, rad/s^2."""
+
+    def params(self, team: Team) -> Vector:
+        rate = self.bandwidths().rate
+        span = self.delay if self.predicted else 0.0
+        head = [span, self.lag, 0.5 * rate, self.max_angular_acceleration]
+        rows = np.hstack([team.inertias, rate * team.inertias])
+        return np.concatenate([head, rows.ravel()])
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(_SLOTS * team.n)
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        return carry_rows(old, fresh, 0, _SLOTS, places)

@@ -1,0 +1,82 @@
+"""The paper's load law with the mass of the load learned in flight, at gains that the delay allows."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.jit import kernel
+from colift.load_control.base import SIGNATURE, LoadControlPart
+from colift.part import Vector
+from colift.team import Team
+from colift.tuning import LEAN, Delays
+
+# memory: learned over told mass, less 1 (so that zero is the start); integral (3)
+
+
+@kernel(SIGNATURE)
+def _adaptive(load, reference, dt, params, memory, u_L):  # type: ignore[no-untyped-def]
+    m, g, k_p, k_d, k_i = params[0], params[1], params[2], params[3], params[4]
+    learn, slope, lower, upper = params[5], params[6], params[7], params[8]
+    limit, tangent = params[9], params[10]
+    along = 0.0
+    for k in range(3):
+        e = load[0, k] - reference[0, k]
+        e_dot = load[1, k] - reference[1, k]
+        regressor = reference[2, k] + (g if k == 2 else 0.0)
+        # m_hat' = -gamma (g e3 + xdd_d) . (edot + lambda e)
+        along += regressor * (e_dot + slope * e)
+    memory[0] = min(max(memory[0] - dt * learn * along / m, lower - 1.0), upper - 1.0)
+    m_hat = m * (1.0 + memory[0])
+    for k in range(3):
+        e = load[0, k] - reference[0, k]
+        e_dot = load[1, k] - reference[1, k]
+        if k < 2:
+            memory[1 + k] = min(max(memory[1 + k] + dt * e, -limit), limit)
+        gravity = g if k == 2 else 0.0
+        u_L[k] = m_hat * (gravity + reference[2, k]) - k_p * e - k_d * e_dot - k_i * memory[1 + k]
+    # Keep the cables taut and the formation upright: a force up, within a cone.
+    u_L[2] = max(u_L[2], 0.3 * m_hat * g)
+    across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
+    if across > tangent * u_L[2]:
+        u_L[0] *= tangent * u_L[2] / across
+        u_L[1] *= tangent * u_L[2] / across
+
+
+class Adaptive(LoadControlPart, Delays):
+    """PID whose mass follows ``m_hat' = -gamma (g e3 + xdd_d) . (edot + lambda e)``, kept in bounds.
+
+    The adaptation of Villa, Brandao, Sarcinelli-Filho (2021) and of Slotine and Li (1987), with the
+    projection of Ioannou and Sun (1996). It takes the place of the vertical integral. The feedback is weak
+    on purpose: the drones' own position loops hold a load that hangs on three cables or more, and a load
+    error that leans the cables comes back through the drones' lag.
+    """
+
+    kernel = _adaptive
+
+    learning_time: Annotated[float, Field(gt=0.0, le=1e3)] = 1.0
+    """Time constant of the learned mass, s; what it learns against is the drones' stiffness."""
+    lower: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
+    """Least mass that is believed, over the one told."""
+    upper: Annotated[float, Field(ge=1.0, le=10.0)] = 2.5
+    """Largest mass that is believed, over the one told."""
+    integral_limit: Annotated[float, Field(gt=0.0)] = 0.3
+    """Bound on the integral of the horizontal error, m s."""
+    max_lean_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 30.0
+    """Most lean of the wanted force from the vertical, degrees."""
+
+    def params(self, team: Team) -> Vector:
+        band = self.bandwidths()
+        k_p = LEAN * team.load_mass * team.gravity / float(team.cable_lengths.mean())
+        stiffness = float(team.masses.sum()) * band.velocity * band.position + k_p
+        slope = band.position
+        learn = stiffness / (self.learning_time * slope * max(team.gravity, 1e-3) ** 2)
+        head = [team.load_mass, team.gravity, k_p, k_p / band.velocity, 0.5 * k_p]
+        tail = [self.integral_limit, math.tan(math.radians(self.max_lean_deg))]
+        return np.array([*head, learn, slope, self.lower, self.upper, *tail])
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(4)
