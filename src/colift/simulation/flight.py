@@ -153,6 +153,8 @@ class Flight:
             self._disturbances[int(number)] = disturbance
         elif section in self._parts and section != "plant":
             part = _with(self._parts[section], name, value)
+            if part.memory(leg.team).shape != getattr(leg.memory, section).shape:
+                raise ColiftError(f"{path}: cannot change in flight")
             _refill(getattr(leg.params, section), part.of(leg.drones).params(leg.team), path)
             self._parts[section] = part
         else:
