@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from colift.allocation.base import INFO_SIZE
 from colift.disturbance.base import DisturbancePart
 from colift.errors import ColiftError
-from colift.fault.base import Change
+from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.mission.schema import Event, Mission
 from colift.part import LAYERS, Part, Vector, find
@@ -266,10 +266,15 @@ class Flight:
         drones = self.drones
         if isinstance(due, Change):
             signal = getattr(self.bus, due.signal)
-            if due.drone is None:
-                signal[...] = due.value
+            value = np.array(due.value, dtype=np.float64)  # None becomes NaN
+            if due.drone == LOAD:
+                signal = signal[-1:]
             elif due.drone in drones:
-                signal[drones.index(due.drone)] = due.value
+                place = drones.index(due.drone)
+                signal = signal[place : place + 1]
+            elif due.drone is not None:
+                return
+            np.copyto(signal, value, where=~np.isnan(value))
         elif due.field == "drones.lose":
             if due.value in drones and len(drones) > 1:
                 self.regroup([drone for drone in drones if drone != due.value])
