@@ -14,7 +14,7 @@ VELOCITY_MARGIN = math.radians(65.0)
 """Phase margin of the velocity loop."""
 
 DOUBT = 0.25
-"""Share of a predicted delay that is still counted: the prediction's model is not the truth."""
+"""Share of a predicted delay or lag that still counts: the prediction's model is not the truth."""
 
 LEAN = 0.5
 """Most that the wanted cable directions answer to a load error: metres that the drones move for a metre."""
@@ -47,14 +47,14 @@ class Delays(BaseModel):
         """The rule.
 
         ``J dOmega/dt = -K_d Omega(t - tau)`` crosses over at ``w = K_d / J`` with the phase margin
-        ``pi/2 - w tau``; ``tau`` is the delay, half a period of the hold, and the motors' lag. A
-        predicted delay counts by a quarter. The angle's loop around it is critically damped at a quarter
+        ``pi/2 - w tau``; ``tau`` is the delay, half a period of the hold, and the motors' lag. What
+        is predicted counts by a quarter. The angle's loop around it is critically damped at a quarter
         of ``w`` (so ``rho = w / 2``, for the manifold's ``q_e`` is half an angle). The velocity loop
         sees ``tau`` and the lag ``1 / w`` of an attitude whose wanted rate is fed forward; position again
         a quarter.
         """
         share = DOUBT if self.predicted else 1.0
-        tau = share * self.delay + 0.5 * self.period + self.lag
+        tau = share * (self.delay + self.lag) + 0.5 * self.period
         rate = (0.5 * math.pi - RATE_MARGIN) / tau
         velocity = (0.5 * math.pi - VELOCITY_MARGIN) / (tau + 2.0 / rate)
         return Bandwidths(rate, 0.25 * rate, velocity, 0.25 * velocity)

@@ -41,6 +41,7 @@ def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: igno
     whole = min(int(span / dt + 1e-9), _MOST - 1)
     rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
     keep = math.exp(-dt / params[1]) if params[1] > 0.0 else 0.0
+    linger = (1.0 - keep) * params[1] / dt  # mean over a period of what is left of the old torque
     for i in range(n):
         c = _HEAD + 6 * i
         o = _SLOTS * i
@@ -71,18 +72,20 @@ def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: igno
             s = turning[k] - Omega_d[i, k] + rho * errors[k]
             J, K_d = params[c + k], params[c + 3 + k]
             limit = J * params[3]
-            tau[i, k] = min(max(-K_d * s, -limit), limit)
-            # What acts in the coming period: behind the motors' lag.
-            memory[act + k] = keep * memory[act + k] + (1.0 - keep) * tau[i, k]
-            memory[o + k] = memory[act + k]
+            wanted = min(max(-K_d * s, -limit), limit)
+            # The motors' lag is inverted: at the end of the period acts what is wanted now.
+            acting = memory[act + k]
+            tau[i, k] = min(max(acting + (wanted - acting) / (1.0 - keep), -limit), limit)
+            memory[act + k] = keep * acting + (1.0 - keep) * tau[i, k]
+            memory[o + k] = tau[i, k] + linger * (acting - tau[i, k])
 
 
 class DelayAware(AttitudeControlPart, Delays):
     """``tau = -K_d (Omega_e + rho q_e)`` with gains from the delay, on a predicted attitude.
 
     The paper's law without its robust term (eqs. 11 to 13). With ``predicted``, attitude and rate are carried
-    forward over ``delay`` by Euler's equations and the torques that were commanded meanwhile: a Smith
-    predictor in state space (Manitius and Olbrot 1979, "finite spectrum assignment").
+    forward over ``delay`` by Euler's equations and the torques that acted meanwhile (a Smith predictor in
+    state space; Manitius and Olbrot 1979, "finite spectrum assignment"), and the motors' lag is inverted.
     """
 
     kernel = _delay_aware
@@ -92,8 +95,8 @@ class DelayAware(AttitudeControlPart, Delays):
 
     def params(self, team: Team) -> Vector:
         rate = self.bandwidths().rate
-        span = self.delay if self.predicted else 0.0
-        head = [span, self.lag, 0.5 * rate, self.max_angular_acceleration]
+        span, lag = (self.delay, self.lag) if self.predicted else (0.0, 0.0)
+        head = [span, lag, 0.5 * rate, self.max_angular_acceleration]
         rows = np.hstack([team.inertias, rate * team.inertias])
         return np.concatenate([head, rows.ravel()])
 

@@ -20,11 +20,12 @@ FINEST = 0.5e-3
 """The forecast remembers one acceleration for every so many seconds of the delay, s."""
 
 # Parameters: then gains (3 by 2) and gates (2) of load and drones, masses, cable lengths.
-_DELAY, _LAG, _PERIOD, _PATIENCE, _BELIEF, _GRAVITY, _LOAD_MASS = 0, 1, 2, 3, 4, 5, 6
-_LOAD, _DRONES, _HEAD = 7, 15, 23
+_DELAY, _TURN, _LAG, _PERIOD, _PATIENCE, _SMOOTH, _GRAVITY, _LOAD_MASS = 0, 1, 2, 3, 4, 5, 6, 7
+_LOAD, _DRONES, _HEAD = 8, 16, 24
 # Memory of a body: started; time since its last sample; that sample; its state when the sample was taken:
-# position, velocity, unexplained acceleration; attitude; thrust that acts; ring of known accelerations.
-_AGE, _SAMPLE, _STATE, _ATTITUDE, _THRUST, _RING = 1, 2, 8, 17, 21, 22
+# position, velocity, unexplained acceleration; attitude, its last sample and that one's age; thrust that acts;
+# ring of known accelerations.
+_AGE, _SAMPLE, _STATE, _ATTITUDE, _SEEN, _SINCE, _THRUST, _RING = 1, 2, 8, 17, 21, 25, 26, 27
 
 
 @inline
@@ -96,19 +97,27 @@ def _start(o, row, position, velocity, memory):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _attitude(o, i, fresh, dt, attitudes, rates, params, memory):  # type: ignore[no-untyped-def]
+def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-untyped-def]
     """Integrate the measured rate; of a new attitude believe a share of the turn that leads to it."""
     a = o + _ATTITUDE
     w, x, y, z = quaternion.turn(
         memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
         rates[i, 0] * dt, rates[i, 1] * dt, rates[i, 2] * dt,
     )  # fmt: skip
+    memory[o + _SINCE] += dt
+    fresh = False
+    for k in range(4):
+        fresh = fresh or attitudes[i, k] != memory[o + _SEEN + k]
+        memory[o + _SEEN + k] = attitudes[i, k]
     if fresh:
         ew, ex, ey, ez = quaternion.multiply(
             w, -x, -y, -z, attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
         )
-        share = 2.0 * params[_BELIEF] if ew >= 0.0 else -2.0 * params[_BELIEF]
+        share = 2.0 * memory[o + _SINCE] / (memory[o + _SINCE] + params[_SMOOTH])
+        if ew < 0.0:
+            share = -share
         w, x, y, z = quaternion.turn(w, x, y, z, share * ex, share * ey, share * ez)
+        memory[o + _SINCE] = 0.0
     scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
     memory[a] = w * scale
     memory[a + 1] = x * scale
@@ -142,12 +151,12 @@ def _predict(  # type: ignore[no-untyped-def]
         if memory[o] == 0.0:
             memory[o + _THRUST] = thrusts[i]
             for k in range(4):
-                memory[o + _ATTITUDE + k] = attitudes[i, k]
+                memory[o + _ATTITUDE + k] = memory[o + _SEEN + k] = attitudes[i, k]
         _start(o, i, positions, velocities, memory)
         memory[o + _THRUST] = keep * memory[o + _THRUST] + (1.0 - keep) * thrusts[i]
         fresh = _sampled(o, i, params[_PERIOD], dt, memory, positions, velocities)
-        _attitude(o, i, fresh, dt, attitudes, rates, params, memory)
-        turn, a = params[_DELAY], o + _ATTITUDE
+        _attitude(o, i, dt, attitudes, rates, params, memory)
+        turn, a = params[_TURN], o + _ATTITUDE
         qw, qx, qy, qz = quaternion.turn(
             memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
             rates[i, 0] * turn, rates[i, 1] * turn, rates[i, 2] * turn,
@@ -228,23 +237,25 @@ class Predictor(EstimationPart):
     kernel = _predict
 
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
-    """Age of the measurements, s."""
+    """Age of the measured positions and velocities, s."""
+    attitude_delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
+    """Age of the measured attitudes, s."""
     lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
     """Time constant of the motors, s."""
-    period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.01
-    """Sampling period of the measurements, s."""
-    position_noise: Noise = 0.01
+    period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.005
+    """Sampling period of positions and velocities, s."""
+    position_noise: Noise = 0.002
     """Standard deviation of a drone's measured position, m."""
-    velocity_noise: Noise = 0.03
+    velocity_noise: Noise = 0.02
     """Of its velocity, m/s."""
-    load_position_noise: Noise = 0.01
+    load_position_noise: Noise = 0.002
     """Of the load's measured position, m."""
-    load_velocity_noise: Noise = 0.05
+    load_velocity_noise: Noise = 0.02
     """Of its velocity, m/s."""
     unexplained: Noise = 2.0
     """How far the acceleration that nobody commanded walks in a second, m/s^2."""
-    attitude_belief: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
-    """Share of a newly measured attitude that is believed beside the integrated rate."""
+    attitude_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
+    """Time in which the integrated rate is drawn to the measured attitude, s; 0 believes each measurement."""
     gate: Annotated[float, Field(gt=0.0, le=100.0)] = 5.0
     """Most surprise that a measurement may cause, standard deviations."""
     load_from: Literal["sensor", "cables"] = "sensor"
@@ -254,8 +265,8 @@ class Predictor(EstimationPart):
 
     def params(self, team: Team) -> Vector:
         patience = self.patience if self.load_from == "sensor" else -1.0
-        head = [self.delay, self.lag, self.period, patience, self.attitude_belief]
-        head += [team.gravity, team.load_mass]
+        head = [self.delay, self.attitude_delay, self.lag, self.period, patience]
+        head += [self.attitude_filter, team.gravity, team.load_mass]
         for noise in (
             (self.load_position_noise, self.load_velocity_noise),
             (self.position_noise, self.velocity_noise),
