@@ -286,6 +286,7 @@ class FieldTable(SphinxDirective):
         "start": "Start",
         "timing": "Timing",
         "events": "Event",
+        "criteria": "Bound",
     }
 
     def run(self) -> list[nodes.Node]:
