@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 RATE_MARGIN = math.radians(60.0)
 """Phase margin of the body-rate loop."""
 
-VELOCITY_MARGIN = math.radians(65.0)
+VELOCITY_MARGIN = math.radians(52.0)
 """Phase margin of the velocity loop."""
 
 DOUBT = 0.25

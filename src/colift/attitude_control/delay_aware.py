@@ -15,9 +15,11 @@ from colift.part import Places, Vector, carry_rows
 from colift.team import Team
 from colift.tuning import Delays
 
-_HEAD = (
-    4  # params: predicted delay, lag, rho, most angular acceleration; then J, K_d (3 each a drone)
-)
+YAW = 0.25
+"""Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
+
+# params: predicted delay, lag; rho and most angular acceleration (3 each); then J and K_d of each drone (3 each)
+_HEAD = 8
 _MOST = 64  # control periods that a predicted delay may last
 _SLOTS = 3 * _MOST + 3  # memory per drone: past torques, newest first; the torque that acts (3)
 
@@ -36,7 +38,7 @@ def _spin(params, c, tx, ty, tz, p, q, r):  # type: ignore[no-untyped-def]
 @kernel(SIGNATURE)
 def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: ignore[no-untyped-def]
     n = q.shape[0]
-    span, rho = params[0], params[2]
+    span = params[0]
     # Whole periods of the delay, and what is left over of one more.
     whole = min(int(span / dt + 1e-9), _MOST - 1)
     rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
@@ -69,10 +71,12 @@ def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: igno
             for k in range(3):
                 memory[o + 3 * j + k] = memory[o + 3 * (j - 1) + k]
         for k in range(3):
-            s = turning[k] - Omega_d[i, k] + rho * errors[k]
-            J, K_d = params[c + k], params[c + 3 + k]
-            limit = J * params[3]
-            wanted = min(max(-K_d * s, -limit), limit)
+            J, K_d, most = params[c + k], params[c + 3 + k], params[5 + k]
+            # No faster towards the wanted attitude than half of the torque can stop.
+            cap = math.sqrt(2.0 * most * abs(errors[k]))
+            turn = min(max(params[2 + k] * errors[k], -cap), cap)
+            limit = J * most
+            wanted = min(max(-K_d * (turning[k] - Omega_d[i, k] + turn), -limit), limit)
             # The motors' lag is inverted: at the end of the period acts what is wanted now.
             acting = memory[act + k]
             tau[i, k] = min(max(acting + (wanted - acting) / (1.0 - keep), -limit), limit)
@@ -83,22 +87,26 @@ def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: igno
 class DelayAware(AttitudeControlPart, Delays):
     """``tau = -K_d (Omega_e + rho q_e)`` with gains from the delay, on a predicted attitude.
 
-    The paper's law without its robust term (eqs. 11 to 13). With ``predicted``, attitude and rate are carried
+    The paper's law (eqs. 11 to 13) without its robust term, bounded by what the rotors can do: far from the wanted
+    attitude it turns no faster than it can stop. With ``predicted``, attitude and rate are carried
     forward over ``delay`` by Euler's equations and the torques that acted meanwhile (a Smith predictor in
     state space; Manitius and Olbrot 1979, "finite spectrum assignment"), and the motors' lag is inverted.
     """
 
     kernel = _delay_aware
 
-    max_angular_acceleration: Annotated[float, Field(gt=0.0)] = 60.0
-    """Most torque over moment of inertia, about each axis, rad/s^2."""
+    max_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 40.0
+    """Most angular acceleration in roll and pitch, rad/s^2."""
+    max_yaw_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
+    """Most angular acceleration in yaw, for which rotors have little torque, rad/s^2."""
 
     def params(self, team: Team) -> Vector:
         rate = self.bandwidths().rate
         span, lag = (self.delay, self.lag) if self.predicted else (0.0, 0.0)
-        head = [span, lag, 0.5 * rate, self.max_angular_acceleration]
-        rows = np.hstack([team.inertias, rate * team.inertias])
-        return np.concatenate([head, rows.ravel()])
+        gains = rate * np.array([1.0, 1.0, YAW])
+        most = [self.max_acceleration, self.max_acceleration, self.max_yaw_acceleration]
+        rows = np.hstack([team.inertias, gains * team.inertias])
+        return np.concatenate([[span, lag], 0.5 * gains, most, rows.ravel()])
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(_SLOTS * team.n)

@@ -252,7 +252,7 @@ class Predictor(EstimationPart):
     """Of the load's measured position, m."""
     load_velocity_noise: Noise = 0.02
     """Of its velocity, m/s."""
-    unexplained: Noise = 2.0
+    unexplained: Noise = 1.0
     """How far the acceleration that nobody commanded walks in a second, m/s^2."""
     attitude_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
     """Time in which the integrated rate is drawn to the measured attitude, s; 0 believes each measurement."""

@@ -14,14 +14,14 @@ from colift.part import Vector
 from colift.team import Team
 from colift.tuning import LEAN, Delays
 
-# memory: learned over told mass, less 1 (so that zero is the start); integral (3)
+# memory: learned over told mass, less 1 (so that zero is the start); force against a steady horizontal one (2)
 
 
 @kernel(SIGNATURE)
 def _adaptive(load, reference, dt, params, memory, u_L):  # type: ignore[no-untyped-def]
     m, g, k_p, k_d, k_i = params[0], params[1], params[2], params[3], params[4]
     learn, slope, lower, upper = params[5], params[6], params[7], params[8]
-    limit, tangent = params[9], params[10]
+    tangent = params[9]
     along = 0.0
     for k in range(3):
         e = load[0, k] - reference[0, k]
@@ -31,13 +31,17 @@ def _adaptive(load, reference, dt, params, memory, u_L):  # type: ignore[no-unty
         along += regressor * (e_dot + slope * e)
     memory[0] = min(max(memory[0] - dt * learn * along / m, lower - 1.0), upper - 1.0)
     m_hat = m * (1.0 + memory[0])
+    memory[1] -= dt * k_i * (load[0, 0] - reference[0, 0])
+    memory[2] -= dt * k_i * (load[0, 1] - reference[0, 1])
+    size = math.sqrt(memory[1] * memory[1] + memory[2] * memory[2])
+    if size > tangent * m_hat * g:
+        memory[1] *= tangent * m_hat * g / size
+        memory[2] *= tangent * m_hat * g / size
     for k in range(3):
         e = load[0, k] - reference[0, k]
         e_dot = load[1, k] - reference[1, k]
-        if k < 2:
-            memory[1 + k] = min(max(memory[1 + k] + dt * e, -limit), limit)
-        gravity = g if k == 2 else 0.0
-        u_L[k] = m_hat * (gravity + reference[2, k]) - k_p * e - k_d * e_dot - k_i * memory[1 + k]
+        known = m_hat * g if k == 2 else memory[1 + k]
+        u_L[k] = known + m_hat * reference[2, k] - k_p * e - k_d * e_dot
     # Keep the cables taut and the formation upright: a force up, within a cone.
     u_L[2] = max(u_L[2], 0.3 * m_hat * g)
     across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
@@ -57,14 +61,14 @@ class Adaptive(LoadControlPart, Delays):
 
     kernel = _adaptive
 
-    learning_time: Annotated[float, Field(gt=0.0, le=1e3)] = 1.0
-    """Time constant of the learned mass, s; what it learns against is the drones' stiffness."""
+    learning: Annotated[float, Field(gt=0.0, le=2.0)] = 0.3
+    """Rate at which the mass is learned over the bandwidth of the drones' position loops."""
+    leaning: Annotated[float, Field(gt=0.0, le=2.0)] = 0.05
+    """Rate at which the cables are leant against a steady horizontal force on the load, likewise."""
     lower: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
     """Least mass that is believed, over the one told."""
     upper: Annotated[float, Field(ge=1.0, le=10.0)] = 2.5
     """Largest mass that is believed, over the one told."""
-    integral_limit: Annotated[float, Field(gt=0.0)] = 0.3
-    """Bound on the integral of the horizontal error, m s."""
     max_lean_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 30.0
     """Most lean of the wanted force from the vertical, degrees."""
 
@@ -73,10 +77,16 @@ class Adaptive(LoadControlPart, Delays):
         k_p = LEAN * team.load_mass * team.gravity / float(team.cable_lengths.mean())
         stiffness = float(team.masses.sum()) * band.velocity * band.position + k_p
         slope = band.position
-        learn = stiffness / (self.learning_time * slope * max(team.gravity, 1e-3) ** 2)
-        head = [team.load_mass, team.gravity, k_p, k_p / band.velocity, 0.5 * k_p]
-        tail = [self.integral_limit, math.tan(math.radians(self.max_lean_deg))]
-        return np.array([*head, learn, slope, self.lower, self.upper, *tail])
+        learn = self.learning * stiffness / max(team.gravity, 1e-3) ** 2
+        head = [
+            team.load_mass,
+            team.gravity,
+            k_p,
+            0.5 * k_p / band.position,
+            stiffness * self.leaning * band.position,
+        ]
+        tail = [self.lower, self.upper, math.tan(math.radians(self.max_lean_deg))]
+        return np.array([*head, learn, slope, *tail])
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4)
+        return np.zeros(3)

@@ -129,13 +129,13 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     kernel = _observe_and_control
 
-    observer: Annotated[float, Field(gt=0.0, le=50.0)] = 3.0
-    """Bandwidth of the observer, rad/s."""
+    observer: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    """Bandwidth of the observer over that of the position loop."""
     observer_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.5
     """Bound on the observed force over the drone's weight."""
     frequency: Annotated[float, Field(gt=0.0, le=100.0)] = 8.0
     """Natural frequency of the reference filter on the sphere, rad/s."""
-    thrust_filter: Annotated[float, Field(ge=0.0, le=0.5)] = 0.1
+    thrust_filter: Annotated[float, Field(ge=0.0, le=0.5)] = 0.15
     """Time constant of the derivative of the thrust direction, s."""
     min_thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
     """Least vertical thrust over the drone's weight."""
@@ -148,7 +148,7 @@ class DisturbanceObserver(PositionControlPart, Delays):
         band = self.bandwidths()
         attitude_lag = 0.5 / band.attitude
         head = [team.gravity, band.velocity, band.position]
-        head += [self.observer, self.observer_limit, attitude_lag, self.frequency]
+        head += [self.observer * band.position, self.observer_limit, attitude_lag, self.frequency]
         head += [self.thrust_filter, self.min_thrust, self.max_thrust]
         head += [math.tan(math.radians(self.max_tilt_deg))]
         return np.concatenate([head, team.masses, team.cable_lengths])
