@@ -8,12 +8,14 @@ from colift.jit import inline
 
 
 @inline
-def follow(memory, o, tx, ty, tz, omega, dt):  # type: ignore[no-untyped-def]
+def follow(memory, o, tx, ty, tz, omega, dt, reach=math.pi):  # type: ignore[no-untyped-def]
     """Move the unit direction ``memory[o:o+3]`` with rate ``memory[o+3:o+6]`` towards the unit vector t.
 
     Second order, critically damped with natural frequency ``omega`` (rad/s), along geodesics: the
     direction keeps unit length and the rate stays tangent by construction. ``memory[o+6:o+9]`` receives
-    the acceleration, so that direction, rate and acceleration are derivatives of each other.
+    the acceleration, so that direction, rate and acceleration are derivatives of each other. An error beyond
+    ``reach`` (rad) counts as that: the acceleration stays within ``omega^2 reach``, the rate within half of
+    ``omega reach``.
     """
     ax, ay, az = memory[o], memory[o + 1], memory[o + 2]
     bx, by, bz = memory[o + 3], memory[o + 4], memory[o + 5]
@@ -21,7 +23,7 @@ def follow(memory, o, tx, ty, tz, omega, dt):  # type: ignore[no-untyped-def]
     c = ax * tx + ay * ty + az * tz
     ex, ey, ez = tx - c * ax, ty - c * ay, tz - c * az
     s = math.sqrt(ex * ex + ey * ey + ez * ez)
-    scale = math.atan2(s, c) / s if s > 1e-12 else 1.0
+    scale = min(math.atan2(s, c), reach) / s if s > 1e-12 else 1.0
     gain = omega * omega * scale
     # Damping implicitly: stable for any step.
     damp = 1.0 / (1.0 + 2.0 * omega * dt)

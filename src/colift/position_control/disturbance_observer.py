@@ -18,8 +18,9 @@ from colift.team import Team
 from colift.tuning import Delays
 
 # params: g; velocity and position bandwidth; observer bandwidth, its bound over weight, its lag; frequency of
-# the cables; time constant of the thrust's rate; least and most thrust over weight, tangent of the tilt.
-_HEAD = 11  # then m, L
+# the cables; time constant of the thrust's rate; least and most thrust over weight, tangent of the tilt; most
+# acceleration for turning a cable.
+_HEAD = 12  # then m, L
 _AIM = 10  # after started; direction, rate, acceleration (3 each)
 _MOMENTUM, _FORCE, _GUESS = 16, 19, 22  # after u_hat and its rate (3 each)
 _SLOTS = 25
@@ -70,7 +71,8 @@ def _observe_and_control(  # type: ignore[no-untyped-def]
         if memory[o] == 0.0:
             for k in range(3):
                 memory[o + 1 + k] = alpha[i, k]
-        follow(memory, o + 1, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[6], dt)
+        reach = params[11] / (params[6] * params[6] * params[_HEAD + n + i])
+        follow(memory, o + 1, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[6], dt, reach)
         _observe(i, n, v, dt, params, memory, o)
         ax, ay, az = memory[o + 1], memory[o + 2], memory[o + 3]
         dx, dy, dz = memory[o + _GUESS], memory[o + _GUESS + 1], memory[o + _GUESS + 2]
@@ -133,8 +135,10 @@ class DisturbanceObserver(PositionControlPart, Delays):
     """Bandwidth of the observer over that of the position loop."""
     observer_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.5
     """Bound on the observed force over the drone's weight."""
-    frequency: Annotated[float, Field(gt=0.0, le=100.0)] = 8.0
+    frequency: Annotated[float, Field(gt=0.0, le=100.0)] = 5.0
     """Natural frequency of the reference filter on the sphere, rad/s."""
+    max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
+    """Most acceleration that a drone is asked for to turn its cable, m/s^2."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=0.5)] = 0.15
     """Time constant of the derivative of the thrust direction, s."""
     min_thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
@@ -150,7 +154,7 @@ class DisturbanceObserver(PositionControlPart, Delays):
         head = [team.gravity, band.velocity, band.position]
         head += [self.observer * band.position, self.observer_limit, attitude_lag, self.frequency]
         head += [self.thrust_filter, self.min_thrust, self.max_thrust]
-        head += [math.tan(math.radians(self.max_tilt_deg))]
+        head += [math.tan(math.radians(self.max_tilt_deg)), self.max_swing]
         return np.concatenate([head, team.masses, team.cable_lengths])
 
     def memory(self, team: Team) -> Vector:
