@@ -92,6 +92,12 @@ def _total(recording: Recording) -> NDArray[np.float64]:
     return np.asarray(np.nansum(np.abs(recording["tensions"]), axis=1))
 
 
+def _of_flown(recording: Recording, name: str) -> NDArray[np.float64]:
+    """A signal of one value per drone, of those that flew for some time of the recording."""
+    values = recording[name]
+    return np.asarray(values[:, np.isfinite(values).any(axis=0)])
+
+
 def _smallest_angle(directions: NDArray[np.float64]) -> float:
     if directions.shape[1] < 2:
         return float("nan")
@@ -139,7 +145,7 @@ def peak_tension_N(r: Recording) -> float:
 
 @_metric("N s", "sum of tensions integrated over the first 10 s (the paper's J_T)")
 def tension_integral_10s_Ns(r: Recording) -> float:
-    if r.time[-1] < 10.0 - 1e-9:
+    if r.time[0] > 0.0 or r.time[-1] < 10.0 - 1e-9:
         return float("nan")
     rows = r.time <= 10.0 + 1e-9
     return integral(_total(r)[rows], r.time[rows])
@@ -157,13 +163,13 @@ def tension_tracking_rms_N(r: Recording) -> float:
 
 @_metric("1", "largest over smallest mean tension of the cables")
 def tension_imbalance(r: Recording) -> float:
-    means = np.nanmean(r["tensions"], axis=0)
+    means = np.nanmean(_of_flown(r, "tensions"), axis=0)
     return float(means.max() / means.min()) if means.min() > 0 else float("inf")
 
 
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
-    return float(np.nanmax(r["slack_times"], axis=0).sum())
+    return float(np.nanmax(_of_flown(r, "slack_times"), axis=0).sum())
 
 
 @_metric("1", "allocations that failed: not the best answer, and no limit to blame")

@@ -12,7 +12,7 @@ import importlib.metadata
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -172,6 +172,32 @@ def find(layer: str, kind: str) -> type[Part]:
         return part
     module = importlib.import_module(f"colift.{layer}.{kind.replace('-', '_')}")
     return _parts_of(module, module.__name__)[0]
+
+
+def make(layer: str, table: Mapping[str, Any]) -> Part:
+    """The part that a mission's section describes: its ``kind`` and its settings.
+
+    Raises
+    ------
+    UnknownNameError
+        For a kind that the layer does not have.
+    ValueError
+        For settings that the part refuses (a pydantic ``ValidationError``).
+
+    """
+    settings = dict(table)
+    return find(layer, str(settings.pop("kind", ""))).model_validate(settings)
+
+
+def kind_of(part: type[Part]) -> str:
+    """The name under which :func:`find` has a class."""
+    for (layer, kind), registered in _registered.items():
+        if layer == part.layer and registered is part:
+            return kind
+    if part.__module__.startswith(f"colift.{part.layer}."):
+        return part.__module__.rpartition(".")[2].replace("_", "-")
+    points = importlib.metadata.entry_points(group=f"colift.{part.layer}")
+    return next(point.name for point in points if point.load() is part)
 
 
 def _parts_of(module: Any, name: str) -> list[type[Part]]:

@@ -2,7 +2,7 @@
 
 Layout of the HDF5 file (format version 1)::
 
-    /                     attributes: format, mission (JSON), seed, versions (JSON), outcome
+    /                     attributes: format, mission (JSON), seed, versions (JSON), outcome, commands (JSON)
     /time                 (rows,) s
     /signals/<name>       (rows, ...) attributes: unit, symbol, frame, meaning
     /allocator/time       (cycles,) s
@@ -15,7 +15,7 @@ import json
 import os
 import platform
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -78,6 +78,8 @@ class Recording(Mapping[str, Array]):
         Times of the allocations, s.
     outcome : str
         ``"completed"``, or how the flight ended.
+    commands : list of (time, text)
+        What a person did while it flew, s.
 
     """
 
@@ -87,6 +89,7 @@ class Recording(Mapping[str, Array]):
     arrays: dict[str, Array]
     outcome: str = "completed"
     versions: dict[str, str] = field(default_factory=versions)
+    commands: Sequence[tuple[float, str]] = ()
 
     def __getitem__(self, name: str) -> Array:
         try:
@@ -121,6 +124,7 @@ class Recording(Mapping[str, Array]):
             file.attrs["seed"] = self.mission.seed
             file.attrs["versions"] = json.dumps(self.versions)
             file.attrs["outcome"] = self.outcome
+            file.attrs["commands"] = json.dumps(list(self.commands))
             _write(file, "time", self.time, Signal("time", (), "s", "t", "-", "time"))
             _write(
                 file, "allocator/time", self.cycle_time,
@@ -162,6 +166,10 @@ class Recording(Mapping[str, Array]):
                     arrays=arrays,
                     outcome=str(file.attrs["outcome"]),
                     versions=json.loads(file.attrs["versions"]),
+                    commands=[
+                        (float(time), str(text))
+                        for time, text in json.loads(file.attrs.get("commands", "[]"))
+                    ],
                 )
         except (OSError, KeyError, ValueError, TypeError, MissionError) as error:
             raise RecordingError(f"{path}: cannot be read as a recording: {error}") from error

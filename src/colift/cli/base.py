@@ -152,11 +152,11 @@ def progress(title: str) -> Iterator[Report]:
         yield lambda fraction: bar.update(task, completed=fraction)
 
 
-def new_folder(name: str) -> Path:
-    """Make ``runs/NAME-DATE-TIME``, numbered where flights of the same second would share it."""
+def new_folder(name: str, parent: Path = Path("runs")) -> Path:
+    """Make ``PARENT/NAME-DATE-TIME``, numbered where flights of the same second would share it."""
     stem = f"{_slug(name)}-{datetime.now():%Y%m%d-%H%M%S}"
-    folder, number = Path("runs") / stem, 1
-    folder.parent.mkdir(exist_ok=True)
+    folder, number = parent / stem, 1
+    parent.mkdir(parents=True, exist_ok=True)
     while True:
         try:
             folder.mkdir()
