@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import LENGTH, SPREAD, WEIGHT, cables, flight_columns, write_csv
 from hypothesis import given
 from hypothesis import strategies as st
+from made_up_flights import LENGTH, SPREAD, WEIGHT, cables, flight_columns, write_csv
 
 from colift import metrics
 from colift.errors import FlightDataError

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import cables, flight_columns, load_path, usd_log, write_csv
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_up_flights import cables, flight_columns, load_path, usd_log, write_csv
 
 from colift import metrics
 from colift.errors import FlightDataError

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import flight_columns, usd_bytes, usd_log
 from hypothesis import given
 from hypothesis import strategies as st
+from made_up_flights import flight_columns, usd_bytes, usd_log
 
 from colift.errors import FlightDataError
 from colift.importing import read
