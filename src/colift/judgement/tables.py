@@ -122,16 +122,7 @@ def flight_tables(judgement: Judgement) -> Tables:
             times = [shown(v[q], 1) for q in ("median_us", "p99_us", "max_us")]
             counts = ", ".join(f"{name} {count}" for name, count in a.status_counts.items())
             work.append([a.allocator, *times, counts])
-    header = [
-        "allocator",
-        "angle (deg)",
-        "T/F",
-        "peak T (N)",
-        "turn (deg/s)",
-        "max",
-        "left (mN)",
-        "max",
-    ]
+    header = ["allocator", "angle", "T/F", "peak T", "turn", "largest", "left", "largest"]
     yield f"{judgement.flight}: {judgement.n} drones, {duration:.1f} s", header, quality
     yield "Time of one allocation", ["allocator", "median", "99 %", "worst", "statuses"], work
 

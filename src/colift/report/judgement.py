@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from html import escape
-from itertools import chain
+from itertools import chain, cycle
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -51,13 +51,13 @@ def separation(judged: Sequence[Judgement]) -> Figure:
     figure, axes = style.grid(columns=len(sizes), height=2.8, titles=True, legend_rows=2)
     looks = look(list(dict.fromkeys(a.allocator for j in judged for a in j.answers)))
     for panel, n in zip(axes, sizes, strict=True):
-        for kind, colours in looks.items():
+        for (kind, colours), marker in zip(looks.items(), cycle("osD^vP*X<>"), strict=False):
             answers = [a for j in judged if j.n == n for a in j.answers if a.allocator == kind]
             if kind != ACTUAL and answers:
                 panel.plot(
                     [a.numbers["tension_ratio"] for a in answers],
                     [a.numbers["min_angle_deg"] for a in answers],
-                    "o", color=colours["color"], markersize=5.5, alpha=0.85,
+                    marker, color=colours["color"], markersize=5.5, alpha=0.85,
                     markeredgecolor="white", markeredgewidth=0.5, label=kind,
                 )  # fmt: skip
         panel.margins(x=0.06)
@@ -106,7 +106,12 @@ def write_page(
     body = [
         "<header><h1>Allocators on recorded flights</h1>",
         f'<p class="soft">{escape(INTRODUCTION)}</p></header>',
-        html.facts([f"{len(judged)} flights", *(f"{k}: {why}" for k, why in skipped.items())]),
+        html.facts(
+            [
+                f"{len(judged)} flight{'s' * (len(judged) != 1)}",
+                *(f"{k}: {why}" for k, why in skipped.items()),
+            ]
+        ),
         *(f"<p>{escape(sentence)}</p>" for sentence in judgement.findings(judged)),
         f'<p class="soft">Repeat with <code>{escape(command)}</code>.</p>',
     ]
