@@ -105,6 +105,7 @@ def answers(directions: np.ndarray, tensions: np.ndarray, time: np.ndarray) -> A
     )
 
 
+@settings(deadline=None)
 @given(rate=st.floats(-30.0, 30.0), seed=st.integers(0, 99))
 def test_the_rate_of_a_steady_turn_is_its_rate_whatever_the_gaps(rate: float, seed: int) -> None:
     time = np.cumsum(np.random.default_rng(seed).uniform(0.005, 0.05, 60))

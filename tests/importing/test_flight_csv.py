@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_flights import LENGTH, SPREAD, WEIGHT, cables, flight_columns, write_csv
 
@@ -44,6 +44,7 @@ def test_known_geometry_gives_known_numbers(n: int, tmp_path: Path) -> None:
     assert math.isnan(numbers["allocator_failures"])
 
 
+@settings(deadline=None)
 @given(shift=st.floats(-1e3, 1e3), turn=st.floats(0.0, 6.28), n=st.integers(2, 4))
 def test_angles_depend_on_neither_place_nor_heading(
     shift: float, turn: float, n: int, tmp_path_factory: pytest.TempPathFactory

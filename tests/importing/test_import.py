@@ -19,8 +19,8 @@ from made_up_flights import cables, flight_columns, load_path, usd_log, write_cs
 from colift import metrics
 from colift.errors import FlightDataError
 from colift.importing import import_flight
+from colift.importing._clocks import merge
 from colift.importing.base import DRONE_COLUMNS, Log
-from colift.importing.clocks import merge
 from colift.recording import Recording
 from colift.report import figures, html
 
@@ -63,7 +63,7 @@ def logs(shift: float, seed: int) -> tuple[Log, Log]:
     return made[0], made[1]
 
 
-@settings(max_examples=15)
+@settings(max_examples=15, deadline=None)
 @given(shift=st.floats(-1.5, 1.5), seed=st.integers(0, 1000))
 def test_any_shift_of_the_clocks_is_found(shift: float, seed: int) -> None:
     _, offsets = merge(logs(shift, seed), ["a", "b"])
@@ -123,41 +123,3 @@ def test_the_commands(tmp_path: Path) -> None:
     done = colift("import", str(tmp_path / "made-up.csv"), "--load-mass", "-1")
     assert done.returncode == 2
     assert "--load-mass" in done.stderr
-
-
-# ---------------------------------------------------------------- published flights
-
-
-def test_every_published_flight_is_read(shared: Path) -> None:
-    files = sorted(shared.glob("*.csv"))
-    assert len(files) == 10
-    smallest, errors = [], []
-    for file in files:
-        recording = import_flight([file])
-        assert recording.n == int(file.name[0])
-        numbers = metrics.compute(recording)
-        smallest.append(numbers["min_angle_deg"])
-        errors.append(numbers["tracking_rms_m"])
-    assert min(smallest) == pytest.approx(24.8, abs=0.05)
-    assert 0.04 <= min(errors) <= max(errors) <= 0.2
-
-
-def test_the_original_logs_give_the_published_table(shared: Path) -> None:
-    """Made from the same two files by another tool, with its own alignment and digits."""
-    raw = import_flight(sorted((shared / "raw").iterdir()))
-    table = import_flight([shared / "2cfs_window_opt_00.csv"])
-    late = len(table.time) - len(raw.time)
-    assert 0 <= late <= 3
-    assert raw.time + table.time[late] == pytest.approx(table.time[late:], abs=1e-4)
-    for name in ("load", "reference"):
-        np.testing.assert_allclose(raw[name], table[name][late:], atol=1e-9)
-    np.testing.assert_allclose(
-        raw["desired_tensions"][:, 0], table["desired_tensions"][late:, 0], atol=1e-6
-    )
-    np.testing.assert_allclose(raw["positions"][:, 0], table["positions"][late:, 0], atol=1e-9)
-    # The table pairs the second drone's rows by number, we by time: up to 10 ms apart.
-    moved = raw["positions"][:, 1] - table["positions"][late:, 1]
-    assert np.sqrt(np.mean(moved**2)) < 2e-3
-    means = [r["desired_tensions"][:, 1].mean() for r in (raw, table)]
-    assert means[0] == pytest.approx(means[1], rel=1e-3)
-    assert raw.measured("attitudes", "rates", "drone_forces")

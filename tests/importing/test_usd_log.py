@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_flights import flight_columns, usd_bytes, usd_log
 
@@ -26,6 +26,7 @@ def sealed(body: bytes) -> bytes:
     return body + struct.pack("<I", zlib.crc32(body))
 
 
+@settings(deadline=None)
 @given(data=st.data(), version=st.sampled_from([1, 2]), other=st.booleans())
 def test_every_type_comes_back(data: st.DataObject, version: int, other: bool) -> None:
     kinds = data.draw(st.lists(st.sampled_from("bBhHiIef"), min_size=1, max_size=9))
@@ -65,6 +66,7 @@ def test_units_become_si(tmp_path: Path) -> None:
     assert np.isnan(log.drones["drone_forces"]).all()
 
 
+@settings(deadline=None)
 @given(data=st.data())
 def test_a_damaged_file_is_refused(data: st.DataObject) -> None:
     whole = usd_bytes([("a.b", "f")], [(k, [1.0]) for k in range(5)], other=True)
@@ -78,6 +80,7 @@ def test_a_damaged_file_is_refused(data: st.DataObject) -> None:
         decode(bytes(damaged), "log")
 
 
+@settings(deadline=None)
 @given(body=st.binary(max_size=200))
 def test_noise_with_a_valid_checksum_raises_nothing_but_our_error(body: bytes) -> None:
     with contextlib.suppress(FlightDataError):

@@ -41,8 +41,6 @@ the total force wanted on the load, N; ``shares`` are the parts of it that each 
 N, as the force on the load: tension times the direction from the load to the drone.
 """
 
-_NO_FORMATS = {"base", "clocks", "recording"}
-
 
 @dataclass(frozen=True)
 class Log:
@@ -73,10 +71,11 @@ class Log:
 def formats() -> dict[str, ModuleType]:
     """The modules that each read one format, by name."""
     package = importlib.import_module("colift.importing")
-    found = [m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in _NO_FORMATS]
+    found = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
     return {
         name.replace("_", "-"): importlib.import_module(f"colift.importing.{name}")
-        for name in sorted(found)
+        for name in found
+        if not name.startswith("_") and name != "base"
     }
 
 

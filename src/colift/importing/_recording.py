@@ -11,8 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from colift.errors import FlightDataError
+from colift.importing._clocks import merge
 from colift.importing.base import Array, Log, read
-from colift.importing.clocks import merge
 from colift.mission.schema import Drones, Load, RealFlight, Section, Start, Timing
 from colift.recording import Recording, versions
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
