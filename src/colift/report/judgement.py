@@ -51,7 +51,7 @@ def separation(judged: Sequence[Judgement]) -> Figure:
     figure, axes = style.grid(columns=len(sizes), height=2.8, titles=True, legend_rows=2)
     looks = look(list(dict.fromkeys(a.allocator for j in judged for a in j.answers)))
     for panel, n in zip(axes, sizes, strict=True):
-        for (kind, colours), marker in zip(looks.items(), cycle("osD^vP*X<>"), strict=False):
+        for (kind, colours), marker in zip(looks.items(), cycle("osD^vPXhp<>"), strict=False):
             answers = [a for j in judged if j.n == n for a in j.answers if a.allocator == kind]
             if kind != ACTUAL and answers:
                 panel.plot(
