@@ -139,7 +139,7 @@ def _extreme(values: Array, which: Any) -> float:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Judged:
     """One flight: the answers of what flew and of every allocator asked."""
 
     flight: str
@@ -222,7 +222,7 @@ def judge(
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     *,
     progress: Progress | None = None,
-) -> Judgement:
+) -> Judged:
     """Ask allocators what they would have wanted in a flight.
 
     Parameters
@@ -268,7 +268,7 @@ def judge(
                 progress((begin + done) / len(kinds))
 
         answers.append(ask(kind, part, team, scale, time, force, arrays["directions"][0], tick))
-    return Judgement(name, recording.n, scale, tuple(answers))
+    return Judged(name, recording.n, scale, tuple(answers))
 
 
 def twin(team: Team, mean_force: float) -> tuple[Team, float]:

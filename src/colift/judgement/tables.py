@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from colift.judgement.asking import ACTUAL, QUANTITIES, Judgement
+from colift.judgement.asking import ACTUAL, QUANTITIES, Judged
 from colift.metrics import SAFE_ANGLE
 
 BALANCED = 0.02
@@ -21,7 +21,7 @@ _PRAISE = {
 }
 
 
-def findings(judged: Sequence[Judgement]) -> list[str]:
+def findings(judged: Sequence[Judged]) -> list[str]:
     """Who is best at what and in how many flights, in plain words, from the numbers.
 
     Only answers that balance the force are compared: one that leaves out more than :data:`BALANCED` of it
@@ -59,7 +59,7 @@ def balances(row: Mapping[str, float]) -> bool:
 Tables = Iterator[tuple[str, list[str], list[list[str]]]]
 
 
-def tables(judged: Sequence[Judgement]) -> Tables:
+def tables(judged: Sequence[Judged]) -> Tables:
     """What to print: the summary of several flights, or all of a single one."""
     if len(judged) > 1:
         yield from summary(judged)
@@ -67,7 +67,7 @@ def tables(judged: Sequence[Judgement]) -> Tables:
         yield from flight_tables(judged[0])
 
 
-def summary(judged: Sequence[Judgement]) -> Tables:
+def summary(judged: Sequence[Judged]) -> Tables:
     """One table a team size: every allocator over all flights."""
     header = ["allocator", "angle", "< 30", "T/F", "turn", "left", "not ok", "median", "worst"]
     for n in sorted({judgement.n for judgement in judged}):
@@ -100,7 +100,7 @@ NOTE = (
 )
 
 
-def flight_tables(judgement: Judgement) -> Tables:
+def flight_tables(judgement: Judged) -> Tables:
     """One flight: every allocator's quality, and its times and statuses."""
     duration = float(judgement.answers[0].time[-1])
     quality, work = [], []

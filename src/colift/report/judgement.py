@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from colift import judgement
-from colift.judgement import ACTUAL, ON_BOARD, QUANTITIES, Judgement
+from colift.judgement import ACTUAL, ON_BOARD, QUANTITIES, Judged
 from colift.recording import atomic_path
 from colift.report import html, panels, style
 from colift.report.figures import Entry, register
@@ -24,9 +24,9 @@ INTRODUCTION = (
     "allocator wanted in flight, “actual” what the cables did; their tensions were not measured."
 )
 
-OVERALL: dict[str, Entry[Sequence[Judgement]]] = {}
+OVERALL: dict[str, Entry[Sequence[Judged]]] = {}
 """Every figure of all flights together, by name."""
-SINGLE: dict[str, Entry[Judgement]] = {}
+SINGLE: dict[str, Entry[Judged]] = {}
 """Every figure of one flight, by name."""
 
 
@@ -46,7 +46,7 @@ def look(allocators: Sequence[str]) -> dict[str, dict[str, object]]:
     "Each mark is one flight: the smallest angle that an allocator wanted at any time, against the sum of the "
     "tensions it wanted, relative to the force. Up and to the left is better. The dashed line is 30 degrees.",
 )
-def separation(judged: Sequence[Judgement]) -> Figure:
+def separation(judged: Sequence[Judged]) -> Figure:
     sizes = sorted({j.n for j in judged})
     figure, axes = style.grid(columns=len(sizes), height=2.8, titles=True, legend_rows=2)
     looks = look(list(dict.fromkeys(a.allocator for j in judged for a in j.answers)))
@@ -76,7 +76,7 @@ def separation(judged: Sequence[Judgement]) -> Figure:
     "Smallest angle between two cables that each allocator wanted; black what was wanted on board, grey "
     "what the cables did; 30 degrees dashed.",
 )
-def smallest(judged: Judgement) -> Figure:
+def smallest(judged: Judged) -> Figure:
     figure, (axes,) = style.grid(height=2.2, legend_rows=2)
     for kind, lines in look([a.allocator for a in judged.answers]).items():
         answer = next(a for a in judged.answers if a.allocator == kind)
@@ -93,7 +93,7 @@ def smallest(judged: Judgement) -> Figure:
 
 
 def write_page(
-    judged: Sequence[Judgement], skipped: Mapping[str, str], folder: Path, command: str
+    judged: Sequence[Judged], skipped: Mapping[str, str], folder: Path, command: str
 ) -> Path:
     """Write ``judgement.html`` (self-contained) and its figures; return the page's path."""
     overall = draw(OVERALL, judged)
