@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, SerializeAsAny, Tag
@@ -301,6 +303,17 @@ class Frame(Section):
             return ring(len(drones), cone, heading=heading)
         given = np.array(self.start.directions, dtype=float)[drones]
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
+
+
+class RealFlight(Frame):
+    """What is known of a flight that colift did not fly: the team and the timing, no layers."""
+
+    kinds: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """No part of ours flew it."""
+
+    def resolved(self) -> dict[str, Any]:
+        """All that is known, as plain data."""
+        return self.model_dump(mode="json", exclude_none=True)
 
 
 class Mission(Frame):
