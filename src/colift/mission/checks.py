@@ -48,6 +48,7 @@ def cross_checks(
                 "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
             )
     yield from _event_checks(frame, parts, broken)
+    yield from _criteria_checks(frame)
     if not broken & {"world", "load", "drones"}:
         for path, part in _with_paths(parts, lists):
             kind = f"{path}.kind"
@@ -70,6 +71,17 @@ def cross_checks(
             yield Problem(f"fault.{i}.at", f"{at:g}", message)
         if "drones" not in broken and drone != "random" and drone >= n:
             yield Problem(f"fault.{i}.drone", str(drone), f"must be one of the drones 0 to {n - 1}")
+
+
+def _criteria_checks(frame: Frame) -> Iterable[Problem]:
+    from colift.metrics import all_metrics  # which reads recordings, and so missions
+
+    valid = [metric.name for metric in all_metrics()]
+    for name, bound in frame.criteria.items():
+        if name not in valid:
+            yield Problem(f"criteria.{name}", "", str(UnknownNameError("metric", name, valid)))
+        for field, value, message in bound.problems():
+            yield Problem(f"criteria.{name}.{field}".rstrip("."), value, message)
 
 
 def _with_paths(

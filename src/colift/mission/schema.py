@@ -214,6 +214,32 @@ class Event(Section):
     the widest gap between the cables, at the load's velocity, and that is not there before."""
 
 
+class Bound(Section):
+    """What a number must keep within for the flight to pass; one end may be left open."""
+
+    min: float | None = None
+    """Least value, in the metric's unit."""
+    max: float | None = None
+    """Largest value, in the metric's unit."""
+
+    def problems(self) -> list[tuple[str, str, str]]:
+        """Bounds that bound nothing, or that exclude everything."""
+        if self.min is None and self.max is None:
+            return [("", "", "must give min, max or both")]
+        if self.min is not None and self.max is not None and self.min > self.max:
+            return [("min", f"{self.min:g}", f"must be at most max = {self.max:g}")]
+        return []
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is within; what is not a number is not."""
+        return (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
+
+    def __str__(self) -> str:
+        low = "" if self.min is None else f">= {self.min:g}"
+        high = "" if self.max is None else f"<= {self.max:g}"
+        return " and ".join(filter(None, (low, high)))
+
+
 class Frame(Section):
     """What is the same in every mission: all but the sections of the layers."""
 
@@ -231,6 +257,8 @@ class Frame(Section):
     timing: Timing = Timing()
     events: list[Event] = []
     """Changes during the flight."""
+    criteria: dict[str, Bound] = {}
+    """What makes the flight a pass: bounds by the name of a metric."""
 
     @property
     def team(self) -> Team:
