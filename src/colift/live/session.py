@@ -270,13 +270,13 @@ class Session:
 
     def cut(self, drone: int) -> None:
         """Cut a cable: its drone leaves and the others are told."""
-        left = [each for each in self.flight.drones if each != drone]
-        if len(left) == len(self.flight.drones):
-            raise ColiftError(f"drone {drone} does not fly")
-        if not left:
+        drones = self.flight.drones
+        if drone not in drones:
+            raise ColiftError(f"drone {drone + 1} does not fly")
+        if len(drones) == 1:
             raise ColiftError("the last cable cannot be cut")
         self._room()
-        self.flight.regroup(left)
+        self.flight.lose([drone])
         self._did("drones.lose", drone, f"Cable of drone {drone + 1} cut")
 
     def target(self, position: Triple) -> None:
@@ -358,8 +358,8 @@ class Session:
             self._numbers = metrics.compute(recent)
         self.state = {
             "paused": self._paused or self.flight.outcome != "completed",
-            "speed": self._reached,
-            "lag": max(0.0, now - self._due),
+            "speed": round(self._reached, 3),
+            "lag": round(max(0.0, now - self._due), 3),
             "values": {
                 **{name: knobs.read(self.flight, name) for name in self.knobs},
                 "allocation.kind": kind_of(self._allocator),
@@ -379,6 +379,10 @@ class Session:
         return part if isinstance(part, Guided) else Guided()
 
     def _guide(self, part: Guided, text: str) -> None:
+        if self.flight.descent:
+            raise ColiftError(
+                f"the load is brought down ({self.flight.descent}); reset to fly again"
+            )
         self._change("reference", {"kind": "guided", **part.model_dump(mode="json")}, text)
 
     def _room(self) -> None:

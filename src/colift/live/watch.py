@@ -29,7 +29,7 @@ class Watch:
         self._slack: dict[int, float] = {}
         self._last: dict[tuple[str, Any], float] = {}
         self._found = 0
-        self._outcome = "completed"
+        self._ends = ["completed", ""]
 
     def look(self, flight: Flight) -> list[dict[str, Any]]:
         """What has begun since the last look."""
@@ -77,8 +77,9 @@ class Watch:
             for time, drone in flight.found[self._found :]
         ]
         self._found = len(flight.found)
-        if flight.outcome != self._outcome:
-            self._outcome = flight.outcome
-            text = flight.outcome[:1].upper() + flight.outcome[1:]
-            found.append(event(flight.time, "fault", text))
+        ends = [flight.outcome, flight.descent]
+        for now, before in zip(ends, self._ends, strict=True):
+            if now != before:
+                found.append(event(flight.time, "fault", now[:1].upper() + now[1:]))
+        self._ends = ends
         return found

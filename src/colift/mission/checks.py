@@ -60,6 +60,10 @@ def cross_checks(
                 yield Problem(kind, "", message)
             for field, message in part.check(frame.team):
                 yield Problem(f"{path}.{field}", "", message)
+    if "timing" not in broken:
+        for path, part in _with_paths(parts, lists):
+            for field, message in part.check_timing(timing.step, timing.duration):
+                yield Problem(f"{path}.{field}", "", message)
     if len(lists["disturbance"]) > MAX_DISTURBANCES:
         message = f"must be at most {MAX_DISTURBANCES}"
         yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)
