@@ -81,6 +81,15 @@ def setting(flight: Flight, name: str, value: float) -> Any:
     return [value * each / most if most else value for each in now]
 
 
+def conflicts(flight: Flight, name: str, value: Any) -> list[tuple[str, str]]:
+    """What speaks against a setting, as :meth:`colift.part.Part.check` says it."""
+    if name == "load.mass":
+        return []
+    section, _, field = name.rpartition(".")
+    part = flight.parts[section]
+    return type(part).model_validate({**part.model_dump(), field: value}).check(flight.mission.team)
+
+
 def allocators(team: Team) -> list[str]:
     """Names of the allocators that this team can fly with, with their default settings."""
     found = []

@@ -20,7 +20,7 @@ from colift.live.page import live_page
 from colift.live.session import Row, Session
 
 try:
-    from aiohttp import WSCloseCode, WSMsgType, web
+    from aiohttp import WebSocketError, WSCloseCode, WSMessage, WSMsgType, web
 except ModuleNotFoundError as error:
     raise MissingExtraError(
         "flying live needs the package aiohttp: pip install 'colift[live]'"
@@ -157,7 +157,7 @@ class Server:
                 raise web.HTTPForbidden(text="this is not the host that you asked for\n")
             response = await handler(request)
         except web.HTTPException as answer:
-            response = answer
+            response = web.Response(status=answer.status, text=answer.text)
         if not response.prepared:
             response.headers.update(
                 {
@@ -203,7 +203,9 @@ class Server:
             return socket
         try:
             async for message in socket:
-                if message.type is not WSMsgType.TEXT:
+                if _too_big(message):
+                    self._refuse(client, "size", "too large")
+                elif message.type is not WSMsgType.TEXT:
                     self._refuse(client, "malformed", "text only")
                 elif not client.within_rate(asyncio.get_running_loop().time()):
                     self._refuse(client, "rate", "too many messages")
@@ -214,8 +216,6 @@ class Server:
                         code=WSCloseCode.POLICY_VIOLATION, message=b"refused too often"
                     )
         finally:
-            if socket.close_code == WSCloseCode.MESSAGE_TOO_BIG:
-                self.refused["size"] += 1
             self._leave(client)
         return socket
 
@@ -224,15 +224,11 @@ class Server:
         try:
             async with asyncio.timeout(GREETING):
                 message = await socket.receive()
-            if message.type is not WSMsgType.TEXT:
-                raise ValueError("text only")
-            greeting = protocol.parse(message.data)
-            if not isinstance(greeting, protocol.Hello):
-                raise ValueError("the first message must be a greeting")
+            greeting = protocol.parse(message.data) if message.type is WSMsgType.TEXT else None
         except (TimeoutError, ValueError):
-            self.refused[
-                "size" if socket.close_code == WSCloseCode.MESSAGE_TOO_BIG else "greeting"
-            ] += 1
+            greeting = None
+        if not isinstance(greeting, protocol.Hello):
+            self.refused["greeting"] += 1
             await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=b"no greeting")
             return None
         given = (greeting.token or "").encode()
@@ -360,6 +356,11 @@ def _first(error: ValueError) -> str:
     first = errors(include_url=False, include_input=False)[0]
     place = ".".join(map(str, first["loc"]))
     return f"{place}: {first['msg']}" if place else str(first["msg"])
+
+
+def _too_big(message: WSMessage) -> bool:
+    code = message.data.code if isinstance(message.data, WebSocketError) else None
+    return bool(code == WSCloseCode.MESSAGE_TOO_BIG)
 
 
 def _call(loop: asyncio.AbstractEventLoop, function: Callable[..., None], *arguments: Any) -> None:

@@ -234,6 +234,8 @@ class Session:
         if not knob.min <= value <= knob.max:
             raise ColiftError(f"{name} must be between {knob.min:g} and {knob.max:g}")
         setting = knobs.setting(self.flight, name, value)
+        for _, message in knobs.conflicts(self.flight, name, setting):
+            raise ColiftError(message)
         self._change(name, setting, f"{knob.label} {value:.4g} {knob.unit}")
         if name == "load.mass":
             self._turned["truth.load_mass_factor"] = value / self.mission.load.mass

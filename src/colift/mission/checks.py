@@ -122,7 +122,7 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             yield Problem(f"events.{i}.field", event.field, message)
         elif section in present:
             yield from _setting_change(f"events.{i}", present[section], section, name, event.value)
-        elif section == "" or section.startswith("disturbance."):
+        elif event.field.startswith("disturbance."):
             yield Problem(f"events.{i}.field", event.field, "there is no such section")
 
 
