@@ -92,14 +92,15 @@ def _total(recording: Recording) -> NDArray[np.float64]:
     return np.asarray(np.nansum(np.abs(recording["tensions"]), axis=1))
 
 
-def _smallest_angle(directions: NDArray[np.float64]) -> float:
+def _smallest_angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smallest angle of any pair in each row, degrees; NaN for a single cable."""
     if directions.shape[1] < 2:
-        return float("nan")
+        return np.full(len(directions), np.nan)
     # In slices: pairs grow as n^2, and memory should not.
     rows = max(1, 2_000_000 // directions.shape[1] ** 2)
     parts = range(0, len(directions), rows)
-    smallest = [np.nanmin(pairwise_angles(directions[k : k + rows])) for k in parts]
-    return float(np.degrees(min(smallest)))
+    smallest = [np.nanmin(pairwise_angles(directions[k : k + rows]), axis=1) for k in parts]
+    return np.asarray(np.degrees(np.concatenate(smallest)))
 
 
 @_metric("m", "root mean square of the load's distance from its reference")
@@ -114,12 +115,17 @@ def tracking_max_m(r: Recording) -> float:
 
 @_metric("deg", "smallest angle between two actual cables at any time")
 def min_angle_deg(r: Recording) -> float:
-    return _smallest_angle(r["directions"])
+    return float(_smallest_angles(r["directions"]).min())
+
+
+@_metric("deg", "median over time of the smallest angle between two actual cables")
+def usual_angle_deg(r: Recording) -> float:
+    return float(np.median(_smallest_angles(r["directions"])))
 
 
 @_metric("deg", "smallest angle between two wanted cables at any time")
 def min_desired_angle_deg(r: Recording) -> float:
-    return _smallest_angle(r["desired_directions"])
+    return float(_smallest_angles(r["desired_directions"]).min())
 
 
 @_metric("N", "largest simultaneous sum of tensions")
@@ -159,6 +165,12 @@ def tension_tracking_rms_N(r: Recording) -> float:
 def tension_imbalance(r: Recording) -> float:
     means = np.nanmean(r["tensions"], axis=0)
     return float(means.max() / means.min()) if means.min() > 0 else float("inf")
+
+
+@_metric("1", "largest over mean power of the drones in flight, power taken as thrust^(3/2)")
+def energy_imbalance(r: Recording) -> float:
+    power = np.nanmean(np.maximum(r["thrusts"], 0.0) ** 1.5, axis=0)  # a rotor's induced power
+    return float(power.max() / power.mean()) if power.mean() > 0 else float("nan")
 
 
 @_metric("s", "time without tension, summed over cables")

@@ -72,6 +72,8 @@ class AllocatorPart(Part):
     """Base of all allocators: settings, kernel with :data:`SIGNATURE`, parameters and memory."""
 
     layer: ClassVar[str] = "allocation"
+    spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
+    """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
 
     def of(self, drones: Sequence[int]) -> AllocatorPart:
         """Settings for the team of these drones; one with values per cable keeps theirs."""

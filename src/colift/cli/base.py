@@ -93,14 +93,14 @@ def numbers(text: str, least: int, most: int) -> list[int]:
 
 
 def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
-    """Print titled tables of text; the first and the last column may wrap."""
+    """Print titled tables of text; the first and the last column may wrap, a unit goes below its name."""
     for title, header, rows in tables:
         table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
         for k, name in enumerate(header):
             edge = k in (0, len(header) - 1)
             widest = max(len(row[k]) for row in rows) if edge else None
             table.add_column(
-                name, justify="left" if edge else "right", no_wrap=not edge,
+                name.replace(" (", "\n("), justify="left" if edge else "right", no_wrap=not edge,
                 min_width=widest and min(widest, 16),
             )  # fmt: skip
         for row in rows:

@@ -1,0 +1,172 @@
+"""The pages of campaigns: allocators compared, and one mission swept. Made from rows of results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from colift.campaign import judge
+from colift.recording import atomic_path, versions
+from colift.report import html
+from colift.report.campaign_figures import CONTEST, SWEEP, Swept
+from colift.report.render import Drawing, draw
+
+Row = Mapping[str, Any]
+Table = tuple[list[str], list[list[str]]]
+"""Header and rows, as text."""
+
+
+def contest_table(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> Table:
+    """One line an allocator: flights held and these criteria over them."""
+    header = ["allocator", "held", *(_title(criterion) for criterion in criteria)]
+    lines = [
+        [c.name, f"{c.held} of {c.flights}", *(k.text(c.values[k.metric]) for k in criteria)]
+        for c in judge.contestants(rows)
+    ]
+    return header, lines
+
+
+def _title(criterion: judge.Criterion) -> str:
+    unit = "" if criterion.unit == "1" else f" ({criterion.unit})"
+    return f"{criterion.title}{unit}"
+
+
+def write_contest(
+    rows: Sequence[Row],
+    folder: Path,
+    said: Sequence[str],
+    *,
+    command: str,
+    notes: Sequence[str] = (),
+) -> Path:
+    """Write ``report.html`` and its figures.
+
+    Parameters
+    ----------
+    rows : sequence of mappings
+        As :mod:`colift.campaign.judge` reads them; those whose ``study`` is ``"spread"`` only go into the
+        figure of separation against tension.
+    folder : Path
+        Created if missing.
+    said : sequence of str
+        The sentences on top, as from :func:`colift.campaign.judge.words`.
+    command : str
+        What repeats the comparison.
+    notes : sequence of str
+        Sentences on how the flights were made.
+
+    """
+    contest = [row for row in rows if row.get("study", "contest") == "contest"]
+    criteria = judge.criteria_of(contest)
+    field = judge.contestants(contest)
+    missions = list(dict.fromkeys(str(row["mission"]) for row in contest))
+    drawings = draw(CONTEST, rows)
+    body = [
+        "<header><h1>Allocators compared</h1>",
+        f'<p class="soft">{escape(" ".join(notes))}</p></header>',
+        html.facts(
+            [
+                f"{len(field)} allocators",
+                f"{len(missions)} mission{'s' * (len(missions) != 1)}",
+                f"{len(contest)} flights",
+                f"{sum(c.lost for c in field)} lost",
+                f"{sum(c.failed for c in field)} failed",
+            ]
+        ),
+        "<h2>In words</h2>",
+        "<ul>" + "".join(f"<li>{escape(sentence)}</li>" for sentence in said) + "</ul>",
+        "<h2>Over all flights</h2>",
+        f'<p class="soft">{escape(_how(criteria))}</p>',
+        _html_table(*contest_table(contest, criteria)),
+        "<h2>Figures</h2>",
+        *map(html.figure, drawings),
+        "<h2>Mission by mission</h2>",
+    ]
+    for mission in missions:
+        own = [row for row in contest if row["mission"] == mission]
+        body += [f"<h3>{escape(mission)}</h3>", _html_table(*contest_table(own, criteria))]
+    body += [*_failures(contest), *_provenance(command)]
+    return _write(folder, "Allocators compared", body, drawings)
+
+
+def _how(criteria: Sequence[judge.Criterion]) -> str:
+    ways = ", ".join(f"{c.title} {c.how}" for c in criteria)
+    return (
+        f"Each number is taken over the flights that were held: {ways}. A flight is held when it goes to "
+        f"its end with the load never more than {judge.LOST:g} m off its reference. Angles are the "
+        "smallest of any pair; power spread is the largest over the mean of the drones' thrust^(3/2)."
+    )
+
+
+def write_sweep(title: str, swept: Swept, folder: Path, *, command: str) -> Path:
+    """Write ``report.html`` of a sweep and its figures."""
+    drawings = draw(SWEEP, swept)
+    body = [
+        f"<header><h1>{escape(title)}</h1>",
+        '<p class="soft">Mean over the seeds and, where they differ, the least and the largest.</p></header>',
+        "<h2>Numbers</h2>",
+        _html_table(*sweep_table(swept)),
+        "<h2>Figures</h2>",
+        *map(html.figure, drawings),
+        *_failures(swept.rows),
+        *_provenance(command),
+    ]
+    return _write(folder, title, body, drawings)
+
+
+def sweep_table(swept: Swept) -> Table:
+    """One line a combination of values."""
+    header = [*(over.path for over in swept.overs), "completed", *swept.metrics]
+    lines = []
+    for point in swept.points:
+        values = [f"{v:g}" if isinstance(v, float) else str(v) for v in point.values]
+        numbers = [_spread_text(*point.spread[name]) for name in swept.metrics]
+        lines.append([*values, f"{point.completed} of {point.flights}", *numbers])
+    return header, lines
+
+
+def _spread_text(mean: float, least: float, most: float) -> str:
+    if mean != mean:
+        return "-"
+    low, middle, high = (f"{value:.4g}" for value in (least, mean, most))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def _html_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    cells = [[escape(text) for text in row] for row in rows]
+    return html.table(header, cells, numbers=range(1, len(header)))
+
+
+def _failures(rows: Sequence[Row]) -> list[str]:
+    failed = [row for row in rows if row.get("status") == "failed"]
+    if not failed:
+        return []
+    lines = "\n".join(f"{_labels(row)}: {row['error']}" for row in failed)
+    return ["<h2>Errors</h2>", html.details(f"{len(failed)} flights ended in an error", lines)]
+
+
+def _labels(row: Row) -> str:
+    """The columns before the facts, which are what the case was called."""
+    names = list(row)
+    return ", ".join(f"{name} {row[name]}" for name in names[: names.index("key")])
+
+
+def _provenance(command: str) -> list[str]:
+    text = "\n".join(f"{name:9} {value}" for name, value in versions().items())
+    return [
+        "<h2>Provenance</h2>",
+        f'<p class="soft">Repeated by <code>{escape(command)}</code>.</p>',
+        html.details("Versions", text),
+    ]
+
+
+def _write(folder: Path, title: str, body: Sequence[str], drawings: Sequence[Drawing]) -> Path:
+    for drawing in drawings:
+        drawing.save(folder / "figures")
+    target = folder / "report.html"
+    with atomic_path(target) as temporary:
+        text = html.page(f"{title} - colift", "\n".join(body))
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    return target
