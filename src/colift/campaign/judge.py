@@ -69,7 +69,7 @@ class Criterion:
         return abs(value - best) <= max(self.tie[0], self.tie[1] * abs(best))
 
 
-GROUPS = ("Load and cables", "Effort", "The allocator itself")
+GROUPS = ("Load and cables", "Tension", "The allocator itself")
 """Groups of criteria that are shown as one table where there is little room."""
 
 CRITERIA = (
@@ -77,14 +77,14 @@ CRITERIA = (
     Criterion("tracking_max_m", "tracking max", "cm", max, "worst", (0.1, 0.05), scale=100.0),
     Criterion("min_desired_angle_deg", "wanted angle", "deg", min, "worst", (1.0, 0.0), high=True),
     Criterion("min_angle_deg", "actual angle", "deg", min, "worst", (1.0, 0.0), high=True),
-    Criterion("slack_time_s", "slack", "s", sum, "total", (0.01, 0.02)),
+    Criterion("slack_time_s", "slack", "s", sum, "total", (0.01, 0.02), group=GROUPS[1]),
     Criterion("peak_tension_N", "peak tension", "N", max, "worst", group=GROUPS[1]),
     Criterion("tension_integral_Ns", "tension integral", "N s", statistics.fmean, "mean", (0.0, 0.01), group=GROUPS[1]),
     Criterion("energy_imbalance", "power spread", "1", statistics.fmean, "mean", (0.01, 0.0), group=GROUPS[1]),
     Criterion("allocator_median_us", "time median", "us", statistics.median, "median", (0.1, 0.2), group=GROUPS[2]),
     Criterion("allocator_p99_us", "time p99", "us", statistics.median, "median", (0.1, 0.2), group=GROUPS[2]),
     Criterion("allocator_max_us", "time worst", "us", max, "worst", ranked=False, group=GROUPS[2]),
-    Criterion("allocator_limited", "force reduced", "cycles", sum, "total", ranked=False, group=GROUPS[2]),
+    Criterion("allocator_limited", "reduced", "cycles", sum, "total", ranked=False, group=GROUPS[2]),
     Criterion("allocator_failures", "not ok", "cycles", sum, "total", (0.0, 0.0), group=GROUPS[2]),
 )  # fmt: skip
 """The columns of ``colift compare``; the allocator's time is the kernel's alone."""

@@ -20,7 +20,8 @@ from colift.mission.load import load_mission, read_source
 from colift.mission.schema import Mission
 from colift.part import LAYERS, Part, load_file
 
-Labels = dict[str, str | int | float | bool | None]
+Label = str | int | float
+Labels = dict[str, Label]
 """What a case is called in tables: column name to value."""
 
 NOT_FLOWN = ("campaign", "cli", "report")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from colift.campaign.plan import Case, variation
+from colift.campaign.plan import Case, Label, variation
 from colift.errors import MissionError, Problem
 from colift.mission.load import parse_override
 
@@ -25,6 +25,11 @@ class Over:
 
     path: str
     values: tuple[Any, ...]
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """The values as they are written into results: lists as text."""
+        return tuple(v if isinstance(v, str | int | float) else str(v) for v in self.values)
 
     @property
     def numeric(self) -> bool:
@@ -86,23 +91,23 @@ def cases(
     """Every combination of values, times seeds; ``changes`` are made in all of them."""
     found = []
     for seed in range(seeds):
-        for values in itertools.product(*(over.values for over in overs)):
-            point = {over.path: value for over, value in zip(overs, values, strict=True)}
-            labels = {path: _label(value) for path, value in point.items()}
-            given = {**variation(mission, seed), **changes, **point}
+        choices = [zip(over.values, over.labels, strict=True) for over in overs]
+        for choice in itertools.product(*choices):
+            values = {over.path: value for over, (value, _) in zip(overs, choice, strict=True)}
+            labels = {over.path: label for over, (_, label) in zip(overs, choice, strict=True)}
+            given = {**variation(mission, seed), **changes, **values}
             found.append(Case({**labels, "seed": seed}, mission, given))
     return found
 
 
-def _label(value: Any) -> Any:
-    return value if isinstance(value, str | int | float | bool) else str(value)
-
-
-METRICS = (
-    "tracking_rms_m", "min_angle_deg", "mean_total_tension_N", "energy_imbalance", "slack_time_s",
-    "allocator_median_us",
-)  # fmt: skip
-"""The metrics of the table; the file holds all."""
+METRICS = {
+    "tracking_rms_m": "tracking",
+    "min_angle_deg": "least angle",
+    "usual_angle_deg": "usual angle",
+    "mean_total_tension_N": "tension",
+    "slack_time_s": "slack",
+}
+"""The metrics of tables and figure, and how they are called there; the file holds all."""
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from colift.campaign import judge
+from colift.metrics import all_metrics
 from colift.recording import atomic_path, versions
 from colift.report import html
 from colift.report.campaign_figures import CONTEST, SWEEP, Swept
@@ -26,6 +28,14 @@ def contest_table(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> T
         for c in judge.contestants(rows)
     ]
     return header, lines
+
+
+def _grouped_tables(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> list[str]:
+    found = []
+    for group in judge.GROUPS:
+        own = [criterion for criterion in criteria if criterion.group == group]
+        found += [f"<h3>{escape(group)}</h3>", _html_table(*contest_table(rows, own))]
+    return found
 
 
 def _title(criterion: judge.Criterion) -> str:
@@ -79,7 +89,7 @@ def write_contest(
         "<ul>" + "".join(f"<li>{escape(sentence)}</li>" for sentence in said) + "</ul>",
         "<h2>Over all flights</h2>",
         f'<p class="soft">{escape(_how(criteria))}</p>',
-        _html_table(*contest_table(contest, criteria)),
+        *_grouped_tables(contest, criteria),
         "<h2>Figures</h2>",
         *map(html.figure, drawings),
         "<h2>Mission by mission</h2>",
@@ -105,37 +115,45 @@ def write_sweep(title: str, swept: Swept, folder: Path, *, command: str) -> Path
     drawings = draw(SWEEP, swept)
     body = [
         f"<header><h1>{escape(title)}</h1>",
-        '<p class="soft">Mean over the seeds and, where they differ, the least and the largest.</p></header>',
-        "<h2>Numbers</h2>",
-        _html_table(*sweep_table(swept)),
+        '<p class="soft">Over the seeds; only flights that went to their end count.</p></header>',
         "<h2>Figures</h2>",
         *map(html.figure, drawings),
+        "<h2>Numbers</h2>",
+        *(f"<h3>{name}</h3>{_html_table(head, rows)}" for name, head, rows in sweep_tables(swept)),
         *_failures(swept.rows),
         *_provenance(command),
     ]
     return _write(folder, title, body, drawings)
 
 
-def sweep_table(swept: Swept) -> Table:
-    """One line a combination of values."""
-    header = [*(over.path for over in swept.overs), "completed", *swept.metrics]
-    lines = []
-    for point in swept.points:
-        values = [f"{v:g}" if isinstance(v, float) else str(v) for v in point.values]
-        numbers = [_spread_text(*point.spread[name]) for name in swept.metrics]
-        lines.append([*values, f"{point.completed} of {point.flights}", *numbers])
-    return header, lines
+def sweep_tables(swept: Swept) -> list[tuple[str, list[str], list[list[str]]]]:
+    """Titled tables, one line a combination of values: mean, and where seeds differ least and largest."""
+    leaves = [over.path.rpartition(".")[2] for over in swept.overs]
+    paths = [over.path for over in swept.overs]
+    units = {metric.name: metric.unit for metric in all_metrics()}
+    heads = [f"{words} ({units[name]})" for name, words in swept.metrics.items()]
+    header = [*(leaves if len(set(leaves)) == len(leaves) else paths), "done", *heads]
+    several = any(point.flights > 1 for point in swept.points)
+    titles = ("Mean", "Least", "Largest") if several else ("Flights",)
+    tables = []
+    for k, title in enumerate(titles):
+        lines = []
+        for point in swept.points:
+            values = [f"{v:g}" if isinstance(v, float) else str(v) for v in point.values]
+            numbers = [_number(point.spread[name][k]) for name in swept.metrics]
+            lines.append([*values, f"{point.completed} of {point.flights}", *numbers])
+        tables.append((title, header, lines))
+    return tables
 
 
-def _spread_text(mean: float, least: float, most: float) -> str:
-    if mean != mean:
-        return "-"
-    low, middle, high = (f"{value:.4g}" for value in (least, mean, most))
-    return middle if low == high else f"{middle} ({low} to {high})"
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.4g}"
 
 
 def _html_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    cells = [[escape(text) for text in row] for row in rows]
+    cells = [
+        [f'<span class="name">{escape(first)}</span>', *map(escape, rest)] for first, *rest in rows
+    ]
     return html.table(header, cells, numbers=range(1, len(header)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -167,7 +167,7 @@ class Swept:
 
     rows: Rows
     overs: Sequence[Over]
-    metrics: tuple[str, ...] = METRICS
+    metrics: Mapping[str, str] = field(default_factory=lambda: METRICS)
 
     @property
     def points(self) -> list[Point]:
@@ -187,34 +187,31 @@ SWEEP: dict[str, Entry[Swept]] = {}
 )
 def sweep(swept: Swept) -> Figure:
     first, *others = swept.overs
-    figure, axes = style.grid(rows=len(swept.metrics), height=1.25)
+    lines: dict[str, list[Point]] = {}
+    for point in swept.points:
+        rest = zip(others, point.values[1:], strict=True)
+        lines.setdefault(", ".join(f"{over.path} {v}" for over, v in rest), []).append(point)
+    rows = -(-len(lines) // 3)
+    figure, axes = style.grid(rows=len(swept.metrics), height=1.25, legend_rows=rows)
     units = {metric.name: metric.unit for metric in all_metrics()}
     numeric = first.numeric
-    place = {value: value if numeric else k for k, value in enumerate(first.values)}
+    place = {value: value if numeric else k for k, value in enumerate(first.labels)}
     for panel, name in zip(axes, swept.metrics, strict=True):
-        lines: dict[str, list[tuple[float, tuple[float, float, float]]]] = {}
-        for point in swept.points:
-            rest = zip(others, point.values[1:], strict=True)
-            label = ", ".join(f"{over.path} {value}" for over, value in rest)
-            lines.setdefault(label, []).append((place[point.values[0]], point.spread[name]))
         for k, (label, entries) in enumerate(lines.items()):
-            x = np.array([entry[0] for entry in entries])
-            mean, least, most = np.array([entry[1] for entry in entries]).T
+            x = [place[point.values[0]] for point in entries]
+            mean, least, most = np.array([point.spread[name] for point in entries]).T
             look = style.series(k)
             panel.fill_between(x, least, most, color=look["color"], alpha=0.2, linewidth=0)
             marker = "" if numeric and len(x) > 12 else "o"
             panel.plot(x, mean, label=label or None, marker=marker, markersize=3.5, **look)
-        unit = units[name]
-        panel.set_ylabel(
-            name.removesuffix(f"_{unit}") + ("" if unit == "1" else f"\n({unit})"), fontsize=8
-        )
+        panel.set_ylabel(f"{swept.metrics[name]}\n({units[name]})", fontsize=8)
     if not numeric:
-        axes[-1].set_xticks(range(len(first.values)), [str(value) for value in first.values])
+        axes[-1].set_xticks(range(len(first.labels)), [str(value) for value in first.labels])
     elif _geometric(first.values):
         axes[-1].set_xscale("log")
         style.plain_ticks(axes[-1].xaxis, (1.0, 2.0, 5.0))
     axes[-1].set_xlabel(first.path)
-    style.legend(figure)
+    style.legend(figure, rows=rows)
     return figure
 
 

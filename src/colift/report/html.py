@@ -28,6 +28,7 @@ font:1rem/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-seri
 overflow-wrap:break-word}
 h1{font-size:1.7rem;line-height:1.25;margin:0 0 .4rem}
 h2{font-size:1.15rem;margin:2.6rem 0 .7rem}
+h3{font-size:1rem;margin:1.6rem 0 .4rem}
 p{margin:.5rem 0}
 .soft,figcaption,th{color:var(--soft)}
 .facts{display:flex;flex-wrap:wrap;gap:.35rem .5rem;padding:0;margin:1rem 0;list-style:none;
@@ -39,9 +40,12 @@ border-radius:.25rem;margin:1.2rem 0;font-weight:600}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
 th{text-align:left;font-weight:600;font-size:.82rem}
-th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule);vertical-align:top}
+th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule)}
+td{vertical-align:top}
 th:last-child,td:last-child{padding-right:0}
-.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
+.number{text-align:right;font-variant-numeric:tabular-nums}
+td.number,.name{white-space:nowrap}
+th{vertical-align:bottom}
 code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,"DejaVu Sans Mono",monospace}
 td code{color:var(--soft)}
 figure{margin:0 0 2.2rem}
