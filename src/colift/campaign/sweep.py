@@ -51,11 +51,12 @@ def parse_over(text: str) -> Over:
     if ":" not in given:
         values = [parse_override(f"{path}={value}")[1] for value in _split(given)]
         return Over(path, tuple(dict.fromkeys(map(_hashable, values))))
-    low, high, count, *scale = given.split(":")
     try:
+        low, high, count, *scale = given.split(":")
         first, last, number = float(low), float(high), int(count)
     except ValueError:
-        raise _wrong(text, "LOW and HIGH must be numbers and COUNT a whole number") from None
+        message = "must be LOW:HIGH:COUNT: two numbers and a whole one"
+        raise _wrong(text, message) from None
     if scale not in ([], ["log"]) or not (math.isfinite(first) and math.isfinite(last)):
         raise _wrong(text, "must have the form PATH=LOW:HIGH:COUNT or PATH=LOW:HIGH:COUNT:log")
     if not 2 <= number <= MAX_VALUES:
