@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from colift.campaign.plan import Case
+from colift.campaign import engine
+from colift.campaign.plan import Case, Source, plan
 
 SHORT = {"timing.duration": 0.2, "timing.allocation": 0.01, "reference.kind": "hover"}
 HEAD = """
@@ -45,6 +46,12 @@ def write_allocator(folder: Path, name: str) -> Path:
 def hover(allocator: str, seed: int = 0, **changes: float) -> Case:
     given = {"allocation": {"kind": allocator}, "seed": seed, **SHORT, **changes}
     return Case({"allocator": allocator, "seed": seed}, "hover", given)
+
+
+def fly(
+    cases: Sequence[Case], options: engine.Options, sources: Sequence[Source] = ()
+) -> engine.Outcome:
+    return engine.run(plan(cases, sources), options)
 
 
 def wait_for(what: Callable[[], bool], seconds: float = 60.0) -> None:

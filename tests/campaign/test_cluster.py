@@ -14,9 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from campaign_helpers import hover
+from campaign_helpers import fly, hover
 
-from colift.campaign import engine, workers
+from colift.campaign import workers
 from colift.campaign.engine import Options, Progress
 from colift.campaign.plan import Source, plan
 from colift.campaign.store import Store
@@ -75,8 +75,8 @@ def test_a_dask_cluster_flies_the_campaign_though_a_worker_is_killed(
                 os.kill(pids[0], signal.SIGKILL)
                 killed.set()
 
-        options = Options(file, scheduler=address, sources=sources, progress=kill_one)
-        outcome = engine.run(cases, options)
+        options = Options(file, scheduler=address, progress=kill_one)
+        outcome = fly(cases, options, sources)
         assert killed.is_set()
         assert outcome.flown == len(outcome.rows) == 14
         flown = [row for row in outcome.rows if row["allocator"] != "broken"]
@@ -87,7 +87,7 @@ def test_a_dask_cluster_flies_the_campaign_though_a_worker_is_killed(
         assert who == set(pids), "each worker has flown something"
         with Store(file) as store:
             assert len(store.finished()) == 14
-        assert engine.run(cases, Options(file, scheduler=address, sources=sources)).flown == 0
+        assert fly(cases, Options(file, scheduler=address), sources).flown == 0
 
 
 def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:

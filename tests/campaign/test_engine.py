@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from campaign_helpers import gone, hover, wait_for
+from campaign_helpers import fly, gone, hover, wait_for
 
-from colift.campaign import engine
 from colift.campaign.engine import Estimate, Options, Progress
 from colift.campaign.plan import Source, plan
 from colift.campaign.store import Store
@@ -29,7 +28,7 @@ def test_a_campaign_is_flown_once_and_every_number_is_kept(tmp_path: Path) -> No
     file, seen = tmp_path / "new/c.sqlite", list[Progress]()
     cases = [hover(name, seed) for seed in range(2) for name in ("sqp", "ring")]
     options = Options(file, workers=2, progress=seen.append, recordings=tmp_path / "kept")
-    first = engine.run([*cases, cases[0]], options)  # a case twice is one run
+    first = fly([*cases, cases[0]], options)  # a case twice is one run
     assert (first.flown, len(first.rows)) == (4, 4)
     for row, case in zip(first.rows, cases, strict=True):
         assert {name: row[name] for name in case.labels} == case.labels
@@ -44,7 +43,7 @@ def test_a_campaign_is_flown_once_and_every_number_is_kept(tmp_path: Path) -> No
     assert seen[0].remaining > 0.0
     assert seen[-1].remaining == 0.0
 
-    again = engine.run([*cases, hover("ring", 2)], Options(file, workers=1))
+    again = fly([*cases, hover("ring", 2)], Options(file, workers=1))
     assert again.flown == 1
     for row, before in zip(again.rows, first.rows, strict=False):
         assert json.dumps(row) == json.dumps(before)
@@ -54,7 +53,7 @@ def test_metrics_are_those_of_a_flight_by_hand(tmp_path: Path) -> None:
     import colift
 
     case = hover("sqp", 5)
-    (row,) = engine.run([case], Options(tmp_path / "c.sqlite", workers=1)).rows
+    (row,) = fly([case], Options(tmp_path / "c.sqlite", workers=1)).rows
     for name, value in colift.run("hover", overrides=case.overrides).metrics.items():
         if not name.endswith("_us"):
             assert row[name] == pytest.approx(value, rel=1e-12, nan_ok=True), name
@@ -62,22 +61,20 @@ def test_metrics_are_those_of_a_flight_by_hand(tmp_path: Path) -> None:
 
 def test_a_mistake_is_found_before_anything_is_made(tmp_path: Path) -> None:
     with pytest.raises(MissionError):
-        engine.run(
-            [hover("sqp"), hover("sqp", **{"load.mass": -1})], Options(tmp_path / "c.sqlite")
-        )
+        fly([hover("sqp"), hover("sqp", **{"load.mass": -1})], Options(tmp_path / "c.sqlite"))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failure_is_recorded_and_stops_nobody(tmp_path: Path, allocator: Write) -> None:
     source = Source.read(allocator("broken"))
     cases = [hover("broken"), hover("sqp"), hover("ring")]
-    options = Options(tmp_path / "c.sqlite", workers=1, sources=[source])
-    rows = engine.run(cases, options).rows
+    options = Options(tmp_path / "c.sqlite", workers=1)
+    rows = fly(cases, options, [source]).rows
     assert [row["status"] for row in rows] == ["failed", "flown", "flown"]
     assert rows[0]["error"].startswith("ValueError: not today (broken.py, line ")
-    assert engine.run(cases, options).flown == 0
-    retry = Options(options.file, workers=1, sources=[source], retry_failed=True)
-    assert engine.run(cases, retry).flown == 1
+    assert fly(cases, options, [source]).flown == 0
+    retry = Options(options.file, workers=1, retry_failed=True)
+    assert fly(cases, retry, [source]).flown == 1
 
 
 def test_a_worker_that_dies_is_replaced_and_its_job_flown_again(
@@ -85,7 +82,7 @@ def test_a_worker_that_dies_is_replaced_and_its_job_flown_again(
 ) -> None:
     sources = [Source.read(allocator(name)) for name in ("once", "mortal")]
     cases = [hover("once"), hover("mortal"), hover("sqp"), hover("ring")]
-    rows = engine.run(cases, Options(tmp_path / "c.sqlite", workers=2, sources=sources)).rows
+    rows = fly(cases, Options(tmp_path / "c.sqlite", workers=2), sources).rows
     assert [row["status"] for row in rows] == ["flown", "failed", "flown", "flown"]
     assert rows[1]["error"] == "the worker died 2 times (exit code 7)"
 
@@ -166,10 +163,10 @@ def test_two_campaigns_into_one_file_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "c.sqlite"
     with Store(file, create=True) as store, store.writing():
         with pytest.raises(ColiftError, match="another process is running a campaign into it"):
-            engine.run([hover("ring")], Options(file))
+            fly([hover("ring")], Options(file))
         with Store(file) as reader:  # looking is allowed
             assert reader.rows() == []
-    assert engine.run([hover("ring")], Options(file, workers=1)).flown == 1
+    assert fly([hover("ring")], Options(file, workers=1)).flown == 1
 
 
 def test_the_estimate_knows_each_kind_and_asks_the_others_of_an_unknown_one() -> None:

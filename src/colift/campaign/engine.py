@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from colift.campaign.plan import Case, Job, Source, plan, unique
+from colift.campaign.plan import Job, Plan, unique
 from colift.campaign.store import Row, Store
 from colift.campaign.workers import DaskPool, LocalPool, Pool
 from colift.recording import atomic_path
@@ -36,8 +36,6 @@ class Options:
         Processes on this machine; None stands for one a core.
     scheduler : str or None
         Address of a Dask scheduler whose workers fly instead.
-    sources : sequence of Source
-        Files with parts of the user's.
     retry_failed : bool
         Whether runs that failed before are flown again.
     recordings : Path or None
@@ -50,7 +48,6 @@ class Options:
     file: Path
     workers: int | None = None
     scheduler: str | None = None
-    sources: Sequence[Source] = ()
     retry_failed: bool = False
     recordings: Path | None = None
     progress: Callable[[Progress], None] | None = None
@@ -70,20 +67,17 @@ class Outcome:
     workers: int
 
 
-def run(cases: Sequence[Case], options: Options) -> Outcome:
-    """Fly those of ``cases`` whose run the file does not hold; return all of them with their results.
+def run(planned: Plan, options: Options) -> Outcome:
+    """Fly what is planned and not in the file yet; return every case with its result.
 
     Killed at any moment, the file holds each finished run once, and the same call goes on from there.
 
     Raises
     ------
-    MissionError
-        If any case is not valid; nothing has been flown then.
     ColiftError
         If another process runs a campaign into the file, or there is nobody to fly.
 
     """
-    planned = plan(cases, options.sources, keep=options.recordings is not None)
     jobs = unique(job for _, job in planned)
     begin = time.perf_counter()
     with Store(options.file, create=True) as store, store.writing():
@@ -91,7 +85,8 @@ def run(cases: Sequence[Case], options: Options) -> Outcome:
         if options.retry_failed:
             store.forget_failures(job.key for job in jobs)
         there = store.finished()
-        todo = [job for job in jobs if job.key not in there]
+        keep = options.recordings is not None
+        todo = [replace(job, keep=keep) for job in jobs if job.key not in there]
         size = 0
         if todo:
             from colift.simulation import flight  # noqa: F401  compiled once here, loaded by workers

@@ -64,6 +64,13 @@ class Criterion:
             return "-"
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
+    def rule(self) -> str:
+        """When a value ties with the best, in words."""
+        fixed, part = self.tie
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        ways = [f"{fixed:g}{unit}"] * (fixed > 0.0) + [f"{100.0 * part:g} %"] * (part > 0.0)
+        return f"within {' or '.join(ways)}" if ways else "when equal"
+
     def ties(self, value: float, best: float) -> bool:
         """Whether ``value`` is as good as the best."""
         return abs(value - best) <= max(self.tie[0], self.tie[1] * abs(best))

@@ -97,9 +97,11 @@ class Job:
         return float(self.mission["timing"]["duration"])
 
 
-def plan(
-    cases: Sequence[Case], sources: Sequence[Source] = (), *, keep: bool = False
-) -> list[tuple[Labels, Job]]:
+Plan = list[tuple[Labels, Job]]
+"""Every case, resolved."""
+
+
+def plan(cases: Sequence[Case], sources: Sequence[Source] = ()) -> Plan:
     """Resolve every case; equal flights become equal jobs.
 
     Raises
@@ -111,7 +113,7 @@ def plan(
     for source in sources:
         source.load()
     code = code_digest()
-    planned: list[tuple[Labels, Job]] = []
+    planned: Plan = []
     found: dict[Problem, list[Labels]] = {}
     for case in cases:
         try:
@@ -121,7 +123,7 @@ def plan(
                 found.setdefault(problem, []).append(case.labels)
         else:
             key = mission_key(mission, code)
-            planned.append((case.labels, Job(key, mission.resolved(), code, tuple(sources), keep)))
+            planned.append((case.labels, Job(key, mission.resolved(), code, tuple(sources))))
     if found:
         raise MissionError(
             "campaign (nothing was flown)", list(map(_located, found, found.values()))

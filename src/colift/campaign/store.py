@@ -67,10 +67,11 @@ class Store:
         def number(question: str) -> int:
             return int(self._db.execute(question).fetchone()[0])
 
-        with self._transaction():
-            if create and not number("SELECT count(*) FROM sqlite_master"):
-                for statement in _SCHEMA:
-                    self._db.execute(statement)
+        if create:
+            with self._transaction():
+                if not number("SELECT count(*) FROM sqlite_master"):
+                    for statement in _SCHEMA:
+                        self._db.execute(statement)
         marks = number("PRAGMA application_id"), number("PRAGMA user_version")
         if marks != (_APPLICATION, _VERSION):
             self._db.close()

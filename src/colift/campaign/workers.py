@@ -109,8 +109,9 @@ class LocalPool:
 
         def give(worker: _Worker) -> None:
             job, attempt = waiting.popleft()
-            worker.pipe.send(job)
             busy[worker.pipe] = (worker, job, attempt)
+            with contextlib.suppress(BrokenPipeError):  # one that has died shows it when asked
+                worker.pipe.send(job)
 
         while waiting or busy:
             while waiting and len(busy) < self.size:

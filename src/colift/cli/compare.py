@@ -94,14 +94,13 @@ def compare(
         chosen = (
             missions.split(",") if missions else study.QUICK_MISSIONS if quick else study.MISSIONS
         )
-        cases = study.cases(able, chosen, seeds, changes, spread=spread)
-        plan(cases, sources)  # before a folder is made
+        planned = plan(study.cases(able, chosen, seeds, changes, spread=spread), sources)
     target = folder or new_folder("compare")
     with flights("Comparing") as advance:
         outcome = engine.run(
-            cases,
+            planned,
             engine.Options(
-                file=target / FILE, workers=workers, scheduler=scheduler, sources=sources,
+                file=target / FILE, workers=workers, scheduler=scheduler,
                 retry_failed=retry_failed, progress=advance,
                 recordings=target / "recordings" if recordings else None,
             ),

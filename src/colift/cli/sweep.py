@@ -81,14 +81,13 @@ def sweep(
         sources = [Source.read(path) for path in extra or []]
         overs = [study.parse_over(text) for text in over]
         changes = dict(parse_override(text) for text in sets or [])
-        cases = study.cases(mission, overs, seeds, changes)
-        plan(cases, sources)  # before a folder is made
+        planned = plan(study.cases(mission, overs, seeds, changes), sources)
     target = folder or new_folder("sweep")
     with flights(f"Sweeping {mission}") as advance:
         outcome = engine.run(
-            cases,
+            planned,
             engine.Options(
-                file=target / FILE, workers=workers, scheduler=scheduler, sources=sources,
+                file=target / FILE, workers=workers, scheduler=scheduler,
                 retry_failed=retry_failed, progress=advance,
                 recordings=target / "recordings" if recordings else None,
             ),

@@ -88,7 +88,7 @@ def write_contest(
         "<h2>In words</h2>",
         "<ul>" + "".join(f"<li>{escape(sentence)}</li>" for sentence in said) + "</ul>",
         "<h2>Over all flights</h2>",
-        f'<p class="soft">{escape(_how(criteria))}</p>',
+        f'<p class="soft">{escape(_HELD)}</p>',
         *_grouped_tables(contest, criteria),
         "<h2>Figures</h2>",
         *map(html.figure, drawings),
@@ -97,17 +97,27 @@ def write_contest(
     for mission in missions:
         own = [row for row in contest if row["mission"] == mission]
         body += [f"<h3>{escape(mission)}</h3>", _html_table(*contest_table(own, criteria))]
+    body += ["<h2>How the numbers are made</h2>", _rules(criteria)]
     body += [*_failures(contest), *_provenance(command)]
     return _write(folder, "Allocators compared", body, drawings)
 
 
-def _how(criteria: Sequence[judge.Criterion]) -> str:
-    ways = ", ".join(f"{c.title} {c.how}" for c in criteria)
-    return (
-        f"Each number is taken over the flights that were held: {ways}. A flight is held when it goes to "
-        f"its end with the load never more than {judge.LOST:g} m off its reference. Angles are the "
-        "smallest of any pair; power spread is the largest over the mean of the drones' thrust^(3/2)."
-    )
+_HELD = (
+    "Over the flights that were held: to the end, with the load never more than "
+    f"{judge.LOST:g} m off its reference."
+)
+
+
+def _rules(criteria: Sequence[judge.Criterion]) -> str:
+    """What each criterion is, how flights become one number, and what counts as a tie."""
+    meanings = {metric.name: metric.meaning for metric in all_metrics()}
+    rows = []
+    for c in criteria:
+        meaning = meanings[c.metric]
+        level = c.rule() if c.ranked else "not ranked"
+        rows.append([c.title, f"{meaning[:1].upper()}{meaning[1:]}", c.how, level])
+    header = ("criterion", "in one flight", "over flights", "level with the first")
+    return html.table(header, [[escape(text) for text in row] for row in rows])
 
 
 def write_sweep(title: str, swept: Swept, folder: Path, *, command: str) -> Path:
