@@ -102,6 +102,8 @@ def test_nan_is_no_value_and_wins_nothing() -> None:
         ({"a": (40.0, 12.0), "b": (30.0, 10.0)}, ["a", "b"]),
         ({"a": (40.0, 10.0), "b": (40.0, 10.0)}, ["a", "b"]),
         ({"a": (40.0, 10.0), "b": (40.0, 11.0), "c": (50.0, 20.0)}, ["a", "c"]),
+        ({"a": (40.0, 10.0), "b": (39.5, 10.05)}, ["a", "b"]),  # level in both
+        ({"a": (40.0, 10.0), "b": (40.5, 12.0)}, ["a"]),  # half a degree is no reason
     ],
 )
 def test_undominated_are_those_nobody_beats_at_both(

@@ -169,20 +169,22 @@ def winners(criterion: Criterion, field: Sequence[Contestant]) -> list[str]:
 
 
 def undominated(field: Sequence[Contestant]) -> list[str]:
-    """Who is not beaten at separation and at tension by one and the same other."""
-    pairs = {
-        c.name: (c.values.get(SEPARATION.metric, math.nan), c.values.get(EFFORT.metric, math.nan))
-        for c in field
-        if c.ranked
-    }
-    pairs = {name: pair for name, pair in pairs.items() if not any(map(math.isnan, pair))}
-    return [
-        name
-        for name, (angle, tension) in pairs.items()
-        if not any(
-            a >= angle and t <= tension and (a > angle or t < tension) for a, t in pairs.values()
-        )
-    ]
+    """Who is not beaten at separation and at tension by one and the same other.
+
+    Beaten is who is clearly behind in one of the two and at best level in the other.
+    """
+    both = (SEPARATION, EFFORT)
+
+    def value(c: Contestant, criterion: Criterion) -> float:
+        return c.values.get(criterion.metric, math.nan)
+
+    def beats(other: Contestant, c: Contestant) -> bool:
+        level = [k.ties(value(c, k), value(other, k)) for k in both]
+        ahead = [(value(other, k) > value(c, k)) == k.high for k in both]
+        return not all(level) and all(map(max, level, ahead))
+
+    entered = [c for c in field if c.ranked and not any(math.isnan(value(c, k)) for k in both)]
+    return [c.name for c in entered if not any(beats(other, c) for other in entered)]
 
 
 def words(field: Sequence[Contestant], criteria: Sequence[Criterion] = CRITERIA) -> list[str]:

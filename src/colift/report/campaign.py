@@ -24,7 +24,7 @@ def contest_table(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> T
     """One line an allocator: flights held and these criteria over them."""
     header = ["allocator", "held", *(_title(criterion) for criterion in criteria)]
     lines = [
-        [c.name, f"{c.held} of {c.flights}", *(k.text(c.values[k.metric]) for k in criteria)]
+        [c.name, f"{c.held}/{c.flights}", *(k.text(c.values[k.metric]) for k in criteria)]
         for c in judge.contestants(rows)
     ]
     return header, lines
@@ -151,7 +151,7 @@ def sweep_tables(swept: Swept) -> list[tuple[str, list[str], list[list[str]]]]:
         for point in swept.points:
             values = [f"{v:g}" if isinstance(v, float) else str(v) for v in point.values]
             numbers = [_number(point.spread[name][k]) for name in swept.metrics]
-            lines.append([*values, f"{point.completed} of {point.flights}", *numbers])
+            lines.append([*values, f"{point.completed}/{point.flights}", *numbers])
         tables.append((title, header, lines))
     return tables
 
