@@ -88,9 +88,9 @@ def test_comparisons_draw(spiral: Recording) -> None:
         assert "&lt;baseline&gt; $a" in drawing.svg
 
 
-def test_files_are_written(written: Path) -> None:
+def test_files_are_written(spiral: Recording, written: Path) -> None:
     assert (written / "report.html").stat().st_size > 50_000
-    for name in figures.FIGURES:
+    for name in figures.drawable(spiral):
         svg = (written / "figures" / f"{name}.svg").read_text()
         assert "<svg" in svg
         assert svg.rstrip().endswith("</svg>")

@@ -51,5 +51,9 @@ class MissingExtraError(ColiftError):
     """A part calls a package that is not installed; the message names the extra that brings it."""
 
 
+class FlightDataError(ColiftError):
+    """A log of a real flight cannot be read; the message names the file and the place in it."""
+
+
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""

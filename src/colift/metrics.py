@@ -1,4 +1,8 @@
-"""Numbers that judge a flight, each computed from its recording alone."""
+"""Numbers that judge a flight, each computed from its recording alone.
+
+A quantity that was not recorded gives NaN: the metric does not apply. Means are over time, not over
+rows, since the rows of a real flight are not evenly spaced.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +71,8 @@ def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str
         level = "bad" if level == "bad" else "warn"
     error = values.get("tracking_max_m", math.nan)
     if math.isfinite(error) and recording.outcome == "completed":
-        words.append(f"load within {100.0 * error:.2g} cm of its reference")
+        distance = f"{error:.2g} m" if error >= 1.0 else f"{100.0 * error:.2g} cm"
+        words.append(f"load within {distance} of its reference")
     limited = values.get("allocator_limited", 0.0)
     if limited > 0:
         words.append(f"in {limited:.0f} allocations the force gave way to limits")
@@ -76,6 +81,31 @@ def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str
         words.append(f"{failures:.0f} allocations not ok")
         level = "bad" if level == "bad" else "warn"
     return level, "; ".join(words) + "."
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One criterion of the mission: the metric, its value, the bound in words, and whether it holds."""
+
+    metric: str
+    value: float
+    bound: str
+    holds: bool
+
+
+def judge(recording: Recording, values: Mapping[str, float]) -> list[Judgement]:
+    """The mission's criteria against the flight; first of all, that it was completed.
+
+    Empty for a mission without criteria.
+    """
+    criteria = recording.mission.criteria
+    if not criteria:
+        return []
+    finished = recording.outcome == "completed"
+    return [Judgement("outcome", float(finished), recording.outcome, finished)] + [
+        Judgement(name, values[name], str(bound), bound.holds(values[name]))
+        for name, bound in criteria.items()
+    ]
 
 
 def tracking_error(recording: Recording) -> NDArray[np.float64]:
@@ -88,8 +118,40 @@ def integral(values: NDArray[np.float64], time: NDArray[np.float64]) -> float:
     return float(np.trapezoid(values, time)) if len(time) > 1 else 0.0
 
 
+def mean(
+    values: NDArray[np.float64], time: NDArray[np.float64], axis: int | None = None
+) -> NDArray[np.float64]:
+    """Mean over time, s, of what is recorded: each row counts for the time around it.
+
+    Over all values, or with ``axis=0`` over the rows only; NaN where nothing is recorded.
+    """
+    spans = np.gradient(time) if len(time) > 1 else np.ones(1)
+    weights = np.where(np.isnan(values), 0.0, spans.reshape(-1, *[1] * (values.ndim - 1)))
+    total = weights.sum(axis=axis)
+    weighted = (weights * np.nan_to_num(values, posinf=np.inf, neginf=-np.inf)).sum(axis=axis)
+    return np.asarray(np.divide(weighted, total, out=np.full_like(total, np.nan), where=total > 0))
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.max()) if known.size else float("nan")
+
+
+def _count(statuses: NDArray[np.float64], counted: NDArray[np.bool_]) -> float:
+    known = ~np.isnan(statuses)
+    return float(np.count_nonzero(counted & known)) if known.any() else float("nan")
+
+
 def _total(recording: Recording) -> NDArray[np.float64]:
+    if not recording.measured("tensions"):
+        return np.full(len(recording.time), np.nan)
     return np.asarray(np.nansum(np.abs(recording["tensions"]), axis=1))
+
+
+def _smallest_of_rows(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least number of each row; NaN for a row of which none is known."""
+    least = np.min(np.where(np.isnan(values), np.inf, values), axis=1)
+    return np.where(np.isinf(least), np.nan, least)
 
 
 def _smallest_angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -99,33 +161,39 @@ def _smallest_angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     # In slices: pairs grow as n^2, and memory should not.
     rows = max(1, 2_000_000 // directions.shape[1] ** 2)
     parts = range(0, len(directions), rows)
-    smallest = [np.nanmin(pairwise_angles(directions[k : k + rows]), axis=1) for k in parts]
+    smallest = [_smallest_of_rows(pairwise_angles(directions[k : k + rows])) for k in parts]
     return np.asarray(np.degrees(np.concatenate(smallest)))
+
+
+def _smallest_angle(directions: NDArray[np.float64]) -> float:
+    return -_largest(-_smallest_angles(directions))
 
 
 @_metric("m", "root mean square of the load's distance from its reference")
 def tracking_rms_m(r: Recording) -> float:
-    return float(np.sqrt(np.mean(np.sum(tracking_error(r) ** 2, axis=1))))
+    return float(np.sqrt(mean(np.sum(tracking_error(r) ** 2, axis=1), r.time)))
 
 
 @_metric("m", "largest distance of the load from its reference")
 def tracking_max_m(r: Recording) -> float:
-    return float(np.linalg.norm(tracking_error(r), axis=1).max())
+    return _largest(np.linalg.norm(tracking_error(r), axis=1))
 
 
 @_metric("deg", "smallest angle between two actual cables at any time")
 def min_angle_deg(r: Recording) -> float:
-    return float(_smallest_angles(r["directions"]).min())
+    return _smallest_angle(r["directions"])
 
 
 @_metric("deg", "median over time of the smallest angle between two actual cables")
 def usual_angle_deg(r: Recording) -> float:
-    return float(np.median(_smallest_angles(r["directions"])))
+    known = _smallest_angles(r["directions"])
+    known = known[~np.isnan(known)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 @_metric("deg", "smallest angle between two wanted cables at any time")
 def min_desired_angle_deg(r: Recording) -> float:
-    return float(_smallest_angles(r["desired_directions"]).min())
+    return _smallest_angle(r["desired_directions"])
 
 
 @_metric("N", "largest simultaneous sum of tensions")
@@ -135,12 +203,12 @@ def peak_total_tension_N(r: Recording) -> float:
 
 @_metric("N", "time average of the sum of tensions")
 def mean_total_tension_N(r: Recording) -> float:
-    return float(_total(r).mean())
+    return float(mean(_total(r), r.time))
 
 
 @_metric("N", "largest tension of any cable")
 def peak_tension_N(r: Recording) -> float:
-    return float(np.nanmax(r["tensions"]))
+    return _largest(r["tensions"])
 
 
 @_metric("N s", "sum of tensions integrated over the first 10 s (the paper's J_T)")
@@ -158,36 +226,40 @@ def tension_integral_Ns(r: Recording) -> float:
 
 @_metric("N", "root mean square of actual less wanted tension, over all cables")
 def tension_tracking_rms_N(r: Recording) -> float:
-    return float(np.sqrt(np.nanmean((r["tensions"] - r["desired_tensions"]) ** 2)))
+    return float(np.sqrt(mean((r["tensions"] - r["desired_tensions"]) ** 2, r.time)))
 
 
 @_metric("1", "largest over smallest mean tension of the cables")
 def tension_imbalance(r: Recording) -> float:
-    means = np.nanmean(r["tensions"], axis=0)
+    means = mean(r["tensions"], r.time, axis=0)
+    if np.isnan(means).any():
+        return float("nan")
     return float(means.max() / means.min()) if means.min() > 0 else float("inf")
 
 
 @_metric("1", "largest over mean power of the drones in flight, power taken as thrust^(3/2)")
 def energy_imbalance(r: Recording) -> float:
-    power = np.nanmean(np.maximum(r["thrusts"], 0.0) ** 1.5, axis=0)  # a rotor's induced power
-    return float(power.max() / power.mean()) if power.mean() > 0 else float("nan")
+    power = mean(np.maximum(r["thrusts"], 0.0) ** 1.5, r.time, axis=0)  # a rotor's induced power
+    return _largest(power) / float(power.mean()) if power.mean() > 0 else float("nan")
 
 
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
-    return float(np.nanmax(r["slack_times"], axis=0).sum())
+    return float(sum(_largest(times) for times in r["slack_times"].T))
 
 
 @_metric("1", "allocations that failed: not the best answer, and no limit to blame")
 def allocator_failures(r: Recording) -> float:
-    return float(np.count_nonzero(~np.isin(r["allocator_status"], [0, *_WITHIN_LIMITS])))
+    statuses = r["allocator_status"]
+    return _count(statuses, ~np.isin(statuses, [0, *_WITHIN_LIMITS]))
 
 
 @_metric(
     "1", "allocations whose force had to give way to a limit, or that were regaining the limits"
 )
 def allocator_limited(r: Recording) -> float:
-    return float(np.count_nonzero(np.isin(r["allocator_status"], _WITHIN_LIMITS)))
+    statuses = r["allocator_status"]
+    return _count(statuses, np.isin(statuses, _WITHIN_LIMITS))
 
 
 @_metric("1", "mean iterations of an allocation")

@@ -10,22 +10,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from plant_rig import DOWN, E3, Rig, random_rig, rotation
 
 import colift
 from colift.geometry import ring
-from colift.plant.base import Start
-from colift.plant.rigid_cables import RigidCables, derivative, state_size
+from colift.plant._bodies import DRONE, LOAD
+from colift.plant._rigid import derivative
 from colift.team import Team
-
-E3 = np.array([0.0, 0.0, 1.0])
-UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-
-
-def rotation(q):
-    """Rotation matrix of a unit quaternion wxyz, by Rodrigues' formula."""
-    w, v = q[0], q[1:]
-    skew = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew
 
 
 def oracle(team, directions, direction_rates, attitudes, thrusts, external):
@@ -47,96 +38,6 @@ def oracle(team, directions, direction_rates, attitudes, thrusts, external):
     return answer[: 3 * n + 3].reshape(n + 1, 3), answer[3 * n + 3 :] * team.cable_lengths
 
 
-class Rig:
-    """A plant and its team outside of any loop."""
-
-    def __init__(self, team, directions, *, spin=None, attitudes=None, body_rates=None):
-        n = team.n
-        self.team, self.n, self.part = team, n, RigidCables()
-        self.params = self.part.params(team)
-        attitudes = np.tile(UPRIGHT, (n, 1)) if attitudes is None else attitudes
-        start = Start(np.zeros(3), np.zeros(3), directions, attitudes)
-        self.memory = self.part.initial(team, start)
-        self.state = self.memory[: state_size(n)]
-        drones = self.state[6:].reshape(n, 13)
-        if spin is not None:
-            drones[:, 3:6] = spin
-        if body_rates is not None:
-            drones[:, 10:13] = body_rates
-        self.thrusts, self.torques = np.zeros(n), np.zeros((n, 3))
-        self.external = np.zeros((n + 1, 3))
-        self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
-
-    def step(self, dt=0.001, count=1):
-        for _ in range(count):
-            RigidCables.kernel(
-                self.thrusts, self.torques, self.external, dt, self.params, self.memory,
-                self.tensions, self.slack_times,
-            )  # fmt: skip
-        return self
-
-    def observe(self):
-        n = self.n
-        out = [np.zeros((2, 3)), *(np.zeros((n, k)) for k in (3, 3, 4, 3, 3, 3))]
-        RigidCables.observe(self.params, self.memory, *out)
-        names = (
-            "load",
-            "positions",
-            "velocities",
-            "attitudes",
-            "rates",
-            "directions",
-            "direction_rates",
-        )
-        return dict(zip(names, out, strict=True))
-
-    def energy(self):
-        """Translational and potential energy, J; the attitudes' is separate."""
-        s, team = self.observe(), self.team
-        load = 0.5 * team.load_mass * s["load"][1] @ s["load"][1]
-        drones = 0.5 * team.masses @ np.sum(s["velocities"] ** 2, axis=1)
-        height = team.load_mass * s["load"][0, 2] + team.masses @ s["positions"][:, 2]
-        return load + drones + team.gravity * height
-
-    def momentum(self):
-        s, team = self.observe(), self.team
-        return team.load_mass * s["load"][1] + team.masses @ s["velocities"]
-
-    def angular_momentum(self):
-        """Of all bodies as points, about the world's origin."""
-        s, team = self.observe(), self.team
-        drones = np.cross(s["positions"], team.masses[:, None] * s["velocities"]).sum(axis=0)
-        return drones + team.load_mass * np.cross(s["load"][0], s["load"][1])
-
-    def spin_momentum(self):
-        """J Omega of each drone, turned into the world frame."""
-        s = self.observe()
-        body = self.team.inertias * s["rates"]
-        return np.array([rotation(q) @ h for q, h in zip(s["attitudes"], body, strict=True)])
-
-
-def random_rig(seed, n, *, gravity=9.81, spin=2.0):
-    rng = np.random.default_rng(seed)
-    first = rng.uniform(0.01, 0.05, (n, 3))
-    inertias = np.stack([first[:, 0], first[:, 1], 0.7 * (first[:, 0] + first[:, 1])], axis=1)
-    team = Team(
-        load_mass=rng.uniform(0.05, 3.0),
-        masses=rng.uniform(0.1, 2.0, n),
-        inertias=inertias,
-        cable_lengths=rng.uniform(0.2, 3.0, n),
-        gravity=gravity,
-    )
-    directions = rng.normal(size=(n, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    omega = rng.normal(size=(n, 3)) * spin
-    omega -= np.sum(omega * directions, axis=1, keepdims=True) * directions
-    attitudes = rng.normal(size=(n, 4))
-    attitudes /= np.linalg.norm(attitudes, axis=1, keepdims=True)
-    rig = Rig(team, directions, spin=omega, attitudes=attitudes, body_rates=rng.normal(size=(n, 3)))
-    rig.state[:6] = rng.normal(size=6)
-    return rig, rng
-
-
 # ---------------------------------------------------------------- oracle
 
 
@@ -154,24 +55,17 @@ def test_accelerations_and_tensions_agree_with_maximal_coordinates(n):
         )
         slope, T = np.zeros_like(rig.state), np.zeros(n)
         derivative(
-            n, rig.state, rig.thrusts, rig.torques, rig.external, rig.params, T,
-            np.zeros(4 * n), slope,
+            n, rig.state, rig.thrusts, rig.torques, rig.external, rig.attached, rig.params, T,
+            np.zeros(3 * n), np.zeros(n), slope,
         )  # fmt: skip
         scale = max(1.0, np.abs(wanted).max())
         np.testing.assert_allclose(slope[3:6], wanted[n], rtol=0, atol=1e-10 * scale)
         np.testing.assert_allclose(
             T, tensions, rtol=0, atol=1e-10 * max(1.0, np.abs(tensions).max())
         )
-        drones, rates = rig.state[6:].reshape(n, 13), slope[6:].reshape(n, 13)
-        omega, alpha = drones[:, 3:6], drones[:, 0:3]
-        turning = np.cross(rates[:, 3:6], alpha) + np.cross(omega, np.cross(omega, alpha))
-        np.testing.assert_allclose(
-            slope[3:6] - team.cable_lengths[:, None] * turning,
-            wanted[:n],
-            rtol=0,
-            atol=1e-10 * scale,
-        )
-        spin = drones[:, 10:13]
+        rates = slope[LOAD:].reshape(n, DRONE)
+        np.testing.assert_allclose(rates[:, 3:6], wanted[:n], rtol=0, atol=1e-10 * scale)
+        spin = rig.drones[:, 10:13]
         torque_balance = team.inertias * rates[:, 10:13] + np.cross(spin, team.inertias * spin)
         np.testing.assert_allclose(torque_balance, rig.torques, rtol=0, atol=1e-12)
 
@@ -234,9 +128,12 @@ def test_two_bodies_on_a_cable_in_free_fall_rotate_uniformly():
     for _ in range(10):
         rig.step(count=100)
         np.testing.assert_allclose(rig.tensions, reduced * 1.4 * rate**2, rtol=1e-9)
-        np.testing.assert_allclose(rig.state[9:12], [0.0, rate, 0.0], rtol=0, atol=1e-9)
+        speed = np.linalg.norm(rig.observe()["direction_rates"])
+        assert speed == pytest.approx(rate, rel=1e-9)
     # After 1 s the direction has turned by `rate` radians about y: x goes to -z.
-    np.testing.assert_allclose(rig.state[6:9], [np.cos(rate), 0.0, -np.sin(rate)], atol=1e-9)
+    np.testing.assert_allclose(
+        rig.observe()["directions"], [[np.cos(rate), 0.0, -np.sin(rate)]], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(("length", "gravity", "amplitude"), [(1.0, 9.81, 0.2), (2.5, 1.62, 0.4)])
@@ -252,7 +149,8 @@ def test_pendulum_period(length, gravity, amplitude):
     while len(crossings) < 3:
         rig.step()
         time += 0.001
-        angle = np.arctan2(rig.state[6], -rig.state[8])
+        x, _, z = rig.observe()["directions"][0]
+        angle = np.arctan2(x, -z)
         if before * angle < 0.0:
             crossings.append(time - 0.001 * angle / (angle - before))
         before = angle
@@ -261,7 +159,7 @@ def test_pendulum_period(length, gravity, amplitude):
 
 
 def test_positive_thrust_pushes_along_body_z_up():
-    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]))
+    rig = Rig(Team.uniform(1), DOWN)
     rig.thrusts[:] = 20.0
     rig.step(count=100)
     total = 0.5 + 0.225
@@ -274,7 +172,7 @@ def test_positive_thrust_pushes_along_body_z_up():
 )
 def test_torque_turns_the_body_the_right_way(axis, thrust_goes_to):
     """Positive torque about x speeds Omega_x up and tilts the thrust to -y; about y, to +x."""
-    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]))
+    rig = Rig(Team.uniform(1), DOWN)
     rig.torques[0, axis] = 0.01
     rig.step(count=100)
     s = rig.observe()
@@ -310,7 +208,7 @@ def test_external_forces_act_on_drones_and_last_row_on_the_load():
 def test_energy_and_momentum_are_conserved_without_thrust(n):
     rig, _ = random_rig(n, n, gravity=9.81, spin=1.5)
     energy, momentum = rig.energy(), rig.momentum()
-    kinetic = 0.5 * rig.team.masses @ np.sum(rig.observe()["velocities"] ** 2, axis=1)
+    kinetic = rig.kinetic_energy()
     fallen = 0.0
     for _ in range(10):
         rig.step(count=1000)
@@ -340,12 +238,11 @@ def test_constraints_do_not_drift():
     rig.torques[:] = 0.01 * rng.normal(size=(6, 3))
     for _ in range(20):
         rig.step(count=250)
-        drones = rig.state[6:].reshape(6, 13)
-        alpha, omega, q = drones[:, 0:3], drones[:, 3:6], drones[:, 6:10]
-        assert np.abs(np.linalg.norm(alpha, axis=1) - 1.0).max() <= 1e-12
-        assert np.abs(np.linalg.norm(q, axis=1) - 1.0).max() <= 1e-12
-        assert np.abs(np.sum(alpha * omega, axis=1)).max() <= 1e-12 * max(1.0, np.abs(omega).max())
         s = rig.observe()
+        apart = s["load"][1] - s["velocities"]
+        assert np.abs(np.linalg.norm(s["attitudes"], axis=1) - 1.0).max() <= 1e-12
+        along = np.abs(np.sum(s["directions"] * apart, axis=1)).max()
+        assert along <= 1e-12 * max(1.0, np.abs(apart).max())
         spans = np.linalg.norm(s["load"][0] - s["positions"], axis=1)
         np.testing.assert_allclose(spans, rig.team.cable_lengths, rtol=1e-12)
 
@@ -353,7 +250,7 @@ def test_constraints_do_not_drift():
 def test_gyroscopic_torque_does_no_work():
     """Torque-free tri-axial bodies: rotational energy, |J Omega| and J Omega in the world stay."""
     rig, _ = random_rig(3, 5, gravity=0.0, spin=0.0)
-    rig.state[6:].reshape(5, 13)[:, 10:13] *= 6.0
+    rig.drones[:, 10:13] *= 6.0
     inertias = rig.team.inertias
 
     def energy():
@@ -370,7 +267,7 @@ def test_gyroscopic_torque_does_no_work():
 
 
 def test_rotation_about_a_principal_axis_is_uniform():
-    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]), body_rates=[[0.0, 0.0, 2.0]])
+    rig = Rig(Team.uniform(1), DOWN, body_rates=[[0.0, 0.0, 2.0]])
     rig.step(count=500)
     np.testing.assert_allclose(
         rig.observe()["attitudes"][0], [np.cos(0.5), 0.0, 0.0, np.sin(0.5)], atol=1e-10
@@ -394,7 +291,7 @@ def test_integrator_is_of_fourth_order():
 
 def test_slack_time_counts_negative_tension():
     """Thrust down on a drone above the load pushes through the rod."""
-    rig = Rig(Team.uniform(1), np.array([[0.0, 0.0, -1.0]]))
+    rig = Rig(Team.uniform(1), DOWN)
     rig.thrusts[:] = -1.0
     rig.step(count=50)
     assert rig.tensions[0] < 0.0
@@ -403,6 +300,38 @@ def test_slack_time_counts_negative_tension():
     rig.step(count=50)
     assert rig.tensions[0] > 0.0
     assert rig.slack_times[0] == pytest.approx(0.05)
+
+
+def test_a_cut_cable_frees_its_drone_and_leaves_the_others_taut():
+    """The drone falls by its own weight, the rest moves as if it had never been there."""
+    rig, rng = random_rig(31, 4, spin=1.0)
+    rig.thrusts[:] = rng.uniform(2.0, 8.0, 4)
+    rig.thrusts[2] = 0.0
+    rig.step(count=200)
+    rest, kept = Rig(rig.team.of([0, 1, 3]), rig.observe()["directions"][[0, 1, 3]]), [0, 1, 3]
+    rest.load[:], rest.drones[:], rest.thrusts[:] = rig.load, rig.drones[kept], rig.thrusts[kept]
+    before = rig.observe()
+    rig.attached[2] = 0.0
+    rig.step(count=500)
+    rest.step(count=500)
+    after = rig.observe()
+    assert rig.tensions[2] == 0.0
+    np.testing.assert_allclose(rig.load, rest.load, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rig.drones[kept], rest.drones, rtol=0, atol=1e-12)
+    flown = before["positions"][2] + 0.5 * before["velocities"][2] - 0.125 * 9.81 * E3
+    np.testing.assert_allclose(after["positions"][2], flown, rtol=0, atol=1e-12)
+    span = after["load"][0] - after["positions"][2]
+    np.testing.assert_allclose(after["directions"][2], span / np.linalg.norm(span), atol=1e-14)
+
+
+def test_with_all_cables_cut_the_load_is_a_projectile():
+    rig, _ = random_rig(32, 3, spin=2.0)
+    before = rig.load.copy()
+    rig.attached[:] = 0.0
+    rig.step(count=1000)
+    np.testing.assert_allclose(rig.tensions, 0.0)
+    np.testing.assert_allclose(rig.load[0], before[0] + before[1] - 0.5 * 9.81 * E3, atol=1e-11)
+    np.testing.assert_allclose(rig.slack_times, 0.0)
 
 
 def test_sixty_four_drones():

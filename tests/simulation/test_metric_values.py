@@ -32,6 +32,8 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["directions"][rows // 2] = ring(n, np.radians(35.0))
     arrays["desired_directions"][:] = ring(n, np.radians(30.0))
     arrays["slack_times"][-1] = 0.5
+    arrays["thrusts"][:] = 1.0
+    arrays["thrusts"][:, 0] = 4.0
     cycles = {s.name: np.zeros(101) for s in CYCLE_SIGNALS}
     cycles["allocator_status"][[3, 70, 90]] = [1.0, 4.0, 6.0]
     cycles["allocator_iterations"][:] = 2.0
@@ -51,6 +53,7 @@ EXPECTED = {
     "tracking_rms_m": math.sqrt((1001 * 0.03**2 + 1000 * 0.04**2) / 2001),
     "tracking_max_m": 0.04,
     "min_angle_deg": neighbour_angle(35.0),
+    "usual_angle_deg": neighbour_angle(40.0),
     "min_desired_angle_deg": neighbour_angle(30.0),
     "peak_total_tension_N": 21.0,
     "mean_total_tension_N": 11.0,
@@ -59,6 +62,7 @@ EXPECTED = {
     "tension_integral_Ns": 20.0 + 200.0,
     "tension_tracking_rms_N": 0.25,
     "tension_imbalance": 4.0,
+    "energy_imbalance": 8.0 / ((8.0 + 3.0) / 4.0),
     "slack_time_s": 2.0,
     "allocator_failures": 2.0,
     "allocator_limited": 1.0,

@@ -18,7 +18,7 @@ import colift
 from colift.errors import ColiftError, MissionError, Problem
 from colift.mission.load import load_mission, read_source
 from colift.mission.schema import Mission
-from colift.part import LAYERS, Part, load_file
+from colift.part import LAYERS, LISTS, Part, load_file
 
 Label = str | int | float
 Labels = dict[str, Label]
@@ -147,11 +147,14 @@ def mission_key(mission: Mission, code: str) -> str:
 def _foreign_parts(mission: Mission) -> dict[str, str]:
     """Digest of the file of each part that comes from elsewhere, by layer."""
     found = {}
-    for layer in LAYERS:
-        module = type(getattr(mission, layer)).__module__
+    parts = {layer: getattr(mission, layer) for layer in LAYERS}
+    for name in LISTS:
+        parts |= {f"{name}.{i}": part for i, part in enumerate(getattr(mission, name))}
+    for place, part in parts.items():
+        module = type(part).__module__
         path = getattr(sys.modules[module], "__file__", None)
         if path is not None and not module.startswith("colift."):
-            found[layer] = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+            found[place] = hashlib.sha256(Path(path).read_bytes()).hexdigest()
     return found
 
 

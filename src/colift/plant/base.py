@@ -28,21 +28,22 @@ positions         (n, 3)  out: of the drones, world, m
 velocities        (n, 3)  out: world, m/s
 attitudes         (n, 4)  out: wxyz, body to world
 rates             (n, 3)  out: body rates, body frame, rad/s
-directions        (n, 3)  out: unit vectors from drone to load, world
+directions        (n, 3)  out: unit vectors from drone to load, world; of a cut cable too
 direction_rates   (n, 3)  out: their time derivatives, 1/s
 ================  ======  ======================================================
 """
 
-STEP_SIGNATURE = void(vector, matrix, matrix, f8, vector, vector, vector, vector)
-"""``step(thrusts, torques, external, dt, params, memory, tensions, slack_times)``.
+STEP_SIGNATURE = void(vector, matrix, matrix, vector, f8, vector, vector, vector, vector)
+"""``step(thrusts, torques, external, attached, dt, params, memory, tensions, slack_times)``.
 
 ============  ==========  ========================================================
 thrusts       (n,)        along the body z axes, N
 torques       (n, 3)      body frame, N m
 external      (n + 1, 3)  further forces on the drones and, last row, the load, world, N
+attached      (n,)        1 while the cable holds, 0 from when it is cut: no tension, the drone flies free
 dt            float       physics step, s
 tensions      (n,)        out: at the beginning of the step, N
-slack_times   (n,)        in/out: time that each cable has spent without tension, s
+slack_times   (n,)        in/out: time that each cable, while attached, has spent without tension, s
 ============  ==========  ========================================================
 """
 

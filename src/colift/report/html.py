@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import tomli_w
 
-from colift.metrics import all_metrics, verdict
+from colift.metrics import Judgement, all_metrics, judge, verdict
 from colift.recording import Recording, atomic_path
 
 if TYPE_CHECKING:
@@ -136,12 +136,12 @@ def write_report(
         The page; it needs none of the other files. Equal recordings give equal bytes.
 
     """
-    from colift.report.figures import FIGURES
+    from colift.report.figures import drawable
     from colift.report.render import draw
 
     recording = source if isinstance(source, Recording) else source.recording
     folder = Path(folder)
-    drawings = draw(FIGURES, recording)
+    drawings = draw(drawable(recording), recording)
     for drawing in drawings:
         drawing.save(folder / "figures")
     target = folder / "report.html"
@@ -153,7 +153,6 @@ def write_report(
 def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequence[Drawing]) -> str:
     """The page of one flight."""
     mission = recording.mission
-    kinds = ", ".join(f"{layer} {kind}" for layer, kind in mission.kinds.items())
     versions = "\n".join(f"{name:9} {text}" for name, text in recording.versions.items())
     parts = [
         f"<header><h1>{escape(mission.name)}</h1>",
@@ -163,43 +162,87 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
             [
                 f"{recording.n} drone{'s' * (recording.n != 1)}",
                 f"load {mission.load.mass:g} kg",
-                f"{mission.timing.duration:g} s",
-                f"reference {mission.kinds['reference']}",
-                f"allocator {mission.kinds['allocation']}",
-                f"seed {mission.seed}",
+                f"{mission.timing.duration:.4g} s",
+                *_flown_by(recording),
                 f"colift {recording.versions.get('colift', '?')}",
             ]
         ),
+        criteria_table(judge(recording, metrics)),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
         "<h2>Figures</h2>",
         *map(figure, drawings),
         "<h2>Provenance</h2>",
-        f'<p class="soft">Parts: {escape(kinds)}. Seed {mission.seed}.</p>',
-        details(
-            "Mission as flown, every default filled in (a valid mission file)",
-            tomli_w.dumps(mission.resolved()),
-        ),
+        *_provenance(recording),
         details("Versions", versions),
     ]
     return page(f"{mission.name} - colift", "\n".join(part for part in parts if part))
 
 
-def metrics_table(metrics: Mapping[str, float]) -> str:
-    """Every metric with its meaning, value and unit."""
+def _flown_by(recording: Recording) -> list[str]:
+    """Short facts on what flew."""
+    mission = recording.mission
+    if recording.source == "flight":
+        return ["real flight", f"{len(recording.time)} rows"]
+    return [
+        f"reference {mission.kinds['reference']}",
+        f"allocator {mission.kinds['allocation']}",
+        f"seed {mission.seed}",
+    ]
+
+
+def _provenance(recording: Recording) -> list[str]:
+    """Where the numbers come from: the mission and its parts, or the logs of a real flight."""
+    mission = recording.mission
+    resolved = tomli_w.dumps(mission.resolved())
+    if recording.source == "flight":
+        text = "Logs of a real flight. What they do not hold is unknown, and not shown."
+        logs = tomli_w.dumps({k: v for k, v in recording.provenance.items() if v is not None})
+        return [
+            f'<p class="soft">{text}</p>',
+            details("Logs, assumptions and what was inferred", logs),
+            details("Team and timing", resolved),
+        ]
+    kinds = ", ".join(f"{layer} {kind}" for layer, kind in mission.kinds.items())
+    return [
+        f'<p class="soft">Parts: {escape(kinds)}. Seed {mission.seed}.</p>',
+        details("Mission as flown, every default filled in (a valid mission file)", resolved),
+    ]
+
+
+def criteria_table(judged: Sequence[Judgement]) -> str:
+    """The mission's criteria, each with a verdict in words; nothing for a mission without any."""
+    if not judged:
+        return ""
     rows = []
+    for each in judged:
+        value = "" if each.metric == "outcome" else f"{each.value:.4g}"
+        level, word = ("good", "pass") if each.holds else ("bad", "fail")
+        mark = f'<b class="{level}" style="color:var(--tone)">{word}</b>'
+        rows.append((f"<code>{escape(each.metric)}</code>", value, escape(each.bound), mark))
+    return "<h2>Criteria</h2>" + table(
+        ("Quantity", "Value", "Bound", "Verdict"), rows, numbers=(1,)
+    )
+
+
+def metrics_table(metrics: Mapping[str, float]) -> str:
+    """Every metric with its meaning, value and unit; those without a value are only named."""
+    rows, missing = [], []
     for metric in all_metrics():
-        if metric.name in metrics:
+        if math.isnan(metrics.get(metric.name, 0.0)):
+            missing.append(f"<code>{escape(metric.name)}</code>")
+        elif metric.name in metrics:
             value, unit = quantity(metrics[metric.name], metric.unit)
             meaning = metric.meaning[:1].upper() + metric.meaning[1:]
             rows.append((f"{escape(meaning)}<br><code>{escape(metric.name)}</code>", value, unit))
-    return table(("Quantity", "Value", "Unit"), rows, numbers=(1,))
+    text = table(("Quantity", "Value", "Unit"), rows, numbers=(1,))
+    if missing:
+        text += f'<p class="soft">Not measured, or does not apply: {", ".join(missing)}.</p>'
+    return text
 
 
 def quantity(value: float, unit: str) -> tuple[str, str]:
     """A value and its unit for reading: lengths below a metre in cm, no unit for pure numbers."""
-    if math.isnan(value):
-        return "does not apply", ""
     if unit == "m" and abs(value) < 1.0:
         value, unit = 100.0 * value, "cm"
     return f"{value:.4g}", {"1": "", "us": "µs", "deg": "°"}.get(unit, unit)

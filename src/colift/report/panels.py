@@ -174,6 +174,14 @@ def tensions(axes: Axes, recording: Recording) -> Array:
     return flight["tensions"]
 
 
+def wanted_tensions(axes: Axes, recording: Recording) -> Array:
+    """Wanted tensions, N."""
+    flight = intact(recording)
+    per_drone(axes, flight.time, flight["desired_tensions"])
+    axes.set_ylabel("wanted tension (N)")
+    return flight["desired_tensions"]
+
+
 def desired_tensions(axes: Axes, recording: Recording) -> Array:
     """Actual tensions, N, with the wanted ones dashed on top (their mean if they are many)."""
     tensions(axes, recording)

@@ -1,0 +1,118 @@
+"""A plant and its team outside of any loop, for the tests of this folder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colift.plant._bodies import DRONE, LOAD, state_size
+from colift.plant.base import Start
+from colift.plant.rigid_cables import RigidCables
+from colift.team import Team
+
+E3 = np.array([0.0, 0.0, 1.0])
+DOWN = np.array([[0.0, 0.0, -1.0]])
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+OBSERVED = (
+    "load", "positions", "velocities", "attitudes", "rates", "directions", "direction_rates",
+)  # fmt: skip
+
+
+def rotation(q):
+    """Rotation matrix of a unit quaternion wxyz, by Rodrigues' formula."""
+    w, v = q[0], q[1:]
+    skew = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew
+
+
+class Rig:
+    """A plant and its team; ``load`` (2, 3) and ``drones`` (n, 13) are views of the state."""
+
+    def __init__(self, team, directions, part=None, *, spin=None, attitudes=None, body_rates=None):
+        n = team.n
+        self.team, self.n, self.part = team, n, part or RigidCables()
+        self.params = self.part.params(team)
+        attitudes = np.tile(UPRIGHT, (n, 1)) if attitudes is None else attitudes
+        start = Start(np.zeros(3), np.zeros(3), np.asarray(directions), attitudes)
+        self.memory = self.part.initial(team, start)
+        self.state = self.memory[: state_size(n)]
+        self.load = self.state[:LOAD].reshape(2, 3)
+        self.drones = self.state[LOAD:].reshape(n, DRONE)
+        if spin is not None:  # angular velocities of the cables
+            self.drones[:, 3:6] = -team.cable_lengths[:, None] * np.cross(spin, directions)
+        if body_rates is not None:
+            self.drones[:, 10:13] = body_rates
+        self.thrusts, self.torques = np.zeros(n), np.zeros((n, 3))
+        self.external, self.attached = np.zeros((n + 1, 3)), np.ones(n)
+        self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
+
+    def step(self, dt=0.001, count=1):
+        for _ in range(count):
+            type(self.part).kernel(
+                self.thrusts, self.torques, self.external, self.attached, dt, self.params,
+                self.memory, self.tensions, self.slack_times,
+            )  # fmt: skip
+        return self
+
+    def observe(self):
+        n = self.n
+        out = [np.zeros((2, 3)), *(np.zeros((n, k)) for k in (3, 3, 4, 3, 3, 3))]
+        type(self.part).observe(self.params, self.memory, *out)
+        return dict(zip(OBSERVED, out, strict=True))
+
+    def kinetic_energy(self):
+        """Of the bodies as points, J; the attitudes' is separate."""
+        s, team = self.observe(), self.team
+        load = 0.5 * team.load_mass * s["load"][1] @ s["load"][1]
+        return load + 0.5 * team.masses @ np.sum(s["velocities"] ** 2, axis=1)
+
+    def energy(self):
+        """Translational and potential energy, J; that of attitudes and cables is separate."""
+        s, team = self.observe(), self.team
+        height = team.load_mass * s["load"][0, 2] + team.masses @ s["positions"][:, 2]
+        return self.kinetic_energy() + team.gravity * height
+
+    def momentum(self):
+        s, team = self.observe(), self.team
+        return team.load_mass * s["load"][1] + team.masses @ s["velocities"]
+
+    def angular_momentum(self):
+        """Of all bodies as points, about the world's origin."""
+        s, team = self.observe(), self.team
+        drones = np.cross(s["positions"], team.masses[:, None] * s["velocities"]).sum(axis=0)
+        return drones + team.load_mass * np.cross(s["load"][0], s["load"][1])
+
+    def spin_momentum(self):
+        """J Omega of each drone, turned into the world frame."""
+        s = self.observe()
+        body = self.team.inertias * s["rates"]
+        return np.array([rotation(q) @ h for q, h in zip(s["attitudes"], body, strict=True)])
+
+
+def random_team(rng, n, *, gravity=9.81):
+    first = rng.uniform(0.01, 0.05, (n, 3))
+    inertias = np.stack([first[:, 0], first[:, 1], 0.7 * (first[:, 0] + first[:, 1])], axis=1)
+    return Team(
+        load_mass=rng.uniform(0.05, 3.0),
+        masses=rng.uniform(0.1, 2.0, n),
+        inertias=inertias,
+        cable_lengths=rng.uniform(0.2, 3.0, n),
+        gravity=gravity,
+    )
+
+
+def random_rig(seed, n, part=None, *, gravity=9.81, spin=2.0):
+    """Any state with taut cables."""
+    rng = np.random.default_rng(seed)
+    team = random_team(rng, n, gravity=gravity)
+    directions = rng.normal(size=(n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    omega = rng.normal(size=(n, 3)) * spin
+    omega -= np.sum(omega * directions, axis=1, keepdims=True) * directions
+    attitudes = rng.normal(size=(n, 4))
+    attitudes /= np.linalg.norm(attitudes, axis=1, keepdims=True)
+    rates = rng.normal(size=(n, 3))
+    rig = Rig(team, directions, part, spin=omega, attitudes=attitudes, body_rates=rates)
+    shift = rng.normal(size=6)
+    rig.load.ravel()[:] += shift
+    rig.drones[:, :6] += shift
+    return rig, rng
