@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from colift.geometry import min_norm_tensions
 from colift.jit import inline, kernel
 from colift.part import Places, Vector
 from colift.plant._bodies import (
@@ -224,20 +223,17 @@ class ChainPart(BodiesPart):
     def memory(self, team: Team) -> Vector:
         return np.zeros(4 * (state_size(team.n) + BEAD * self.bead_count * team.n) + team.n)
 
+    def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(team.cable_lengths * (1.0 + tensions / self.stiffness))
+
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
-        """Cables straight and stretched by the tensions that hold the load still."""
-        weight = [0.0, 0.0, team.load_mass * team.gravity]
-        tensions = np.maximum(min_norm_tensions(start.directions, weight), 0.0)
-        stretched = team.cable_lengths * (1.0 + tensions / self.stiffness)
-        memory = super().initial(
-            Team(team.load_mass, team.masses, team.inertias, stretched, team.gravity), start
-        )
+        """Straight cables, as long as the tensions that hold the load make them."""
+        memory = super().initial(team, start)
         k, first = self.bead_count, state_size(team.n)
+        drones = memory[LOAD:first].reshape(team.n, 1, DRONE)
         beads = memory[first : first + BEAD * k * team.n].reshape(team.n, k, BEAD)
-        fractions = np.arange(k, 0, -1)[:, None] / (k + 1)
-        spans = (stretched[:, None] * start.directions)[:, None, :]
-        beads[:, :, 0:3] = start.load_position - fractions * spans
-        beads[:, :, 3:6] = start.load_velocity
+        down = np.arange(1, k + 1)[:, None] / (k + 1)
+        beads[:] = (1.0 - down) * drones[:, :, :BEAD] + down * memory[:LOAD]
         return memory
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
