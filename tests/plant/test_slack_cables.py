@@ -6,23 +6,11 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from plant_rig import DOWN, E3, Rig, random_rig, random_team, rotation
+from plant_rig import DOWN, E3, Rig, random_rig, rotation, slack_rig
 
 import colift
 from colift.plant.slack_cables import SlackCables
 from colift.team import Team
-
-
-def slack_rig(seed, n, *, gravity=9.81, speed=2.0):
-    """Drones anywhere within reach of the load, all bodies in motion."""
-    rng = np.random.default_rng(seed)
-    directions = rng.normal(size=(n, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    rig = Rig(random_team(rng, n, gravity=gravity), directions, SlackCables())
-    rig.drones[:, :3] *= rng.uniform(0.3, 1.0, (n, 1))
-    rig.drones[:, 3:6] = speed * rng.normal(size=(n, 3))
-    rig.load[1] = speed * rng.normal(size=3)
-    return rig, rng
 
 
 def stretch(rig):
@@ -146,7 +134,7 @@ def test_a_load_that_drops_into_its_cables_stops_there():
 @pytest.mark.parametrize("n", [1, 2, 4, 8])
 def test_energy_is_never_gained_and_momentum_kept_over_many_catches(n):
     for seed in range(5):
-        rig, _ = slack_rig(50 * n + seed, n, gravity=9.81 if seed % 2 else 0.0)
+        rig, _ = slack_rig(50 * n + seed, n, SlackCables(), gravity=9.81 if seed % 2 else 0.0)
         before, momentum = rig.energy(), rig.momentum()
         turning = rig.angular_momentum()
         catches, scale = 0, rig.kinetic_energy()
@@ -168,7 +156,7 @@ def test_energy_is_never_gained_and_momentum_kept_over_many_catches(n):
 
 
 def test_no_tension_is_negative_and_no_cable_longer_in_a_wild_flight():
-    rig, rng = slack_rig(7, 4, speed=1.0)
+    rig, rng = slack_rig(7, 4, SlackCables(), speed=1.0)
     shortest = 0.0
     for k in range(4000):
         if k % 100 == 0:
@@ -183,7 +171,7 @@ def test_no_tension_is_negative_and_no_cable_longer_in_a_wild_flight():
 
 
 def test_free_fall_is_slack():
-    rig, _ = slack_rig(11, 3, speed=0.0)
+    rig, _ = slack_rig(11, 3, SlackCables(), speed=0.0)
     rig.step(count=500)
     np.testing.assert_allclose(rig.tensions, 0.0)
     np.testing.assert_allclose(rig.slack_times, 0.5)
@@ -211,7 +199,7 @@ def test_order_four_across_catch_and_release():
 
 
 def test_a_cut_cable_is_never_caught():
-    rig, _ = slack_rig(13, 2, gravity=0.0)
+    rig, _ = slack_rig(13, 2, SlackCables(), gravity=0.0)
     rig.drones[:, 3:6] *= 3.0
     rig.attached[0] = 0.0
     before = rig.drones[0, :6].copy()

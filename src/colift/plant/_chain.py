@@ -7,7 +7,8 @@ drones is followed by 6 numbers per bead, position and velocity, drone by drone.
 Waves along a cable are so much faster than anything else that viscous damping, which grows with frequency as no
 braid's does, would dictate the step for their sake. So a segment is damped by its own rate only as far as the undamped
 waves' step allows; the rest of ``tau`` acts on the mean rate of the cable's segments, which is how load and drone bounce.
-It takes energy, too: where it would push, it is cut for all segments alike.
+It takes energy, too: where it would push, it is cut for all segments alike. On a bent cable it moves beads as well, and is
+limited to what the step can follow.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ CABLE = 5
 rate of its cable's segments, bead mass, drag."""
 COURANT = 1.5
 """Substep times the fastest rate; the integrator is stable to 2.6 at least."""
+MILD = 0.5
+"""Substep times the rate at which damping of the mean rate may slow it down."""
 SHORTEST = 1e-6
 """Shortest substep that a plant may ask for, s."""
 
@@ -59,7 +62,7 @@ def segment(y, a, b):  # type: ignore[no-untyped-def]
 
 
 @inline
-def derivative(n, k, y, thrusts, torques, external, attached, params, T, dy):  # type: ignore[no-untyped-def]
+def derivative(n, k, y, thrusts, torques, external, attached, longest, params, T, dy):  # type: ignore[no-untyped-def]
     """Time derivative of the state; fills the tensions ``T`` at the load's end."""
     free_motion(n, y, thrusts, torques, external, params, dy)
     beads, cables = LOAD + DRONE * n, MASS + BODY * n
@@ -78,14 +81,21 @@ def derivative(n, k, y, thrusts, torques, external, attached, params, T, dy):  #
         common = 0.0
         if together > 0.0 and attached[i] > 0.0:
             least, total = math.inf, 0.0
+            px = py = pz = 0.0
+            bend = 0.0
             a = LOAD + DRONE * i
             for j in range(k + 1):
                 b = beads + BEAD * (k * i + j) if j < k else 0
-                _, _, _, d, rate = segment(y, a, b)
+                x, y_, z, d, rate = segment(y, a, b)
                 total += rate
                 least = min(least, d - length)
+                if j > 0:
+                    bend += (x - px) ** 2 + (y_ - py) ** 2 + (z - pz) ** 2
+                px, py, pz = x, y_, z
                 a = b
             if least > 0.0:
+                mobility = 1.0 / params[MASS + BODY * i] + bend / bead_mass + 1.0 / params[0]
+                together = min(together, MILD * (k + 1) / (longest * mobility))
                 common = max(together * total / (k + 1), -stiffness * least)
         a, mass_a = LOAD + DRONE * i, params[MASS + BODY * i]
         for j in range(segments):
@@ -142,7 +152,7 @@ def _step(  # type: ignore[no-untyped-def]
         for m in range(size):
             begin[m] = y[m]
         for stage in range(4):
-            derivative(n, k, y, thrusts, torques, external, attached, params, T, slope)
+            derivative(n, k, y, thrusts, torques, external, attached, longest, params, T, slope)
             runge_kutta(stage, size, h, begin, slope, total, y)
             if stage > 0:
                 continue
