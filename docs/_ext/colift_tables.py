@@ -16,7 +16,7 @@ from sphinx.util.docutils import SphinxDirective
 from colift.metrics import all_metrics
 from colift.mission import schema
 from colift.mission.load import DEFAULT_KINDS
-from colift.part import LAYERS, find, names
+from colift.part import FOLDERS, find, names
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
 from colift.team import Team
 
@@ -282,9 +282,11 @@ class FieldTable(SphinxDirective):
         "world": "World",
         "load": "Load",
         "drones": "Drones",
+        "truth": "Truth",
         "start": "Start",
         "timing": "Timing",
         "events": "Event",
+        "criteria": "Bound",
     }
 
     def run(self) -> list[nodes.Node]:
@@ -293,7 +295,7 @@ class FieldTable(SphinxDirective):
                 table(FIELD_HEAD, field_rows(getattr(schema, self.sections[self.arguments[0]])))
             ]
         plain = ("name", "description", "seed")
-        known = {*plain, *self.sections, "kinds", *LAYERS}
+        known = {*plain, *self.sections, "kinds", "list_kinds", *FOLDERS}
         if missing := set(schema.Mission.model_fields) - known:
             raise self.error(f"the mission has sections that this page lacks: {sorted(missing)}")
         skip = tuple(known - set(plain))

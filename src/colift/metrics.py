@@ -78,6 +78,31 @@ def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str
     return level, "; ".join(words) + "."
 
 
+@dataclass(frozen=True)
+class Judgement:
+    """One criterion of the mission: the metric, its value, the bound in words, and whether it holds."""
+
+    metric: str
+    value: float
+    bound: str
+    holds: bool
+
+
+def judge(recording: Recording, values: Mapping[str, float]) -> list[Judgement]:
+    """The mission's criteria against the flight; first of all, that it was completed.
+
+    Empty for a mission without criteria.
+    """
+    criteria = recording.mission.criteria
+    if not criteria:
+        return []
+    finished = recording.outcome == "completed"
+    return [Judgement("outcome", float(finished), recording.outcome, finished)] + [
+        Judgement(name, values[name], str(bound), bound.holds(values[name]))
+        for name, bound in criteria.items()
+    ]
+
+
 def tracking_error(recording: Recording) -> NDArray[np.float64]:
     """Load position less reference (rows, 3), m."""
     return np.asarray(recording["load"][:, 0] - recording["reference"][:, 0])

@@ -12,9 +12,9 @@ import importlib.metadata
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,24 @@ Places = NDArray[np.int64]
 
 LAYERS = (
     "reference",
+    "sensing",
+    "estimation",
     "load_control",
     "allocation",
+    "link",
     "position_control",
     "attitude_control",
+    "actuation",
+    "detection",
     "plant",
 )
 """The layers of the block diagram: folder name, mission section and entry-point group suffix."""
+
+LISTS = ("disturbance", "fault")
+"""Folders of which a mission may use several parts at once; its sections of this name are lists."""
+
+FOLDERS = (*LAYERS, *LISTS)
+"""Every folder of parts."""
 
 
 class Part(BaseModel):
@@ -52,6 +63,10 @@ class Part(BaseModel):
     kernel: ClassVar[Callable[..., Any]]
     needs: ClassVar[tuple[str, str] | None] = None
     """Package beyond colift's own that the kernel calls, and the extra that installs it."""
+
+    def of(self, drones: Sequence[int]) -> Self:
+        """Settings for the team of these drones; one with values per drone keeps theirs."""
+        return self
 
     def params(self, team: Team) -> Vector:
         """Parameter vector of the kernel; constant between two calls of the kernel."""
@@ -99,8 +114,8 @@ _registered: dict[tuple[str, str], type[Part]] = {}
 
 def register(kind: str, part: type[Part]) -> type[Part]:
     """Make ``part`` available to missions as ``kind = "<kind>"`` of its layer, in this process."""
-    if part.layer not in LAYERS:
-        raise UnknownNameError("layer", part.layer, LAYERS)
+    if part.layer not in FOLDERS:
+        raise UnknownNameError("layer", part.layer, FOLDERS)
     _registered[part.layer, kind] = part
     return part
 
@@ -130,8 +145,8 @@ def load_file(path: str | Path) -> list[type[Part]]:
 
 def names(layer: str) -> list[str]:
     """Names of all parts of a layer, without importing (and so compiling) them."""
-    if layer not in LAYERS:
-        raise UnknownNameError("layer", layer, LAYERS)
+    if layer not in FOLDERS:
+        raise UnknownNameError("layer", layer, FOLDERS)
     folder = importlib.import_module(f"colift.{layer}")
     own = {
         module.name.replace("_", "-")

@@ -13,39 +13,32 @@ from numba.core.runtime import _nrt_python, rtsys
 import colift
 from colift import jit, part
 from colift.allocation import base as allocation
-from colift.attitude_control import base as attitude_control
+from colift.disturbance import base as disturbance
 from colift.errors import ColiftError, UnknownNameError
-from colift.load_control import base as load_control
 from colift.mission import load_mission
-from colift.plant import base as plant
 from colift.plant.base import Start
-from colift.position_control import base as position_control
-from colift.reference import base as reference
 from colift.simulation.flight import Flight
+from colift.simulation.loop import KERNEL_SIGNATURES
+from colift.simulation.signals import CONDITIONS
 from colift.team import Team
 
-SIGNATURES = {
-    "reference": reference.SIGNATURE,
-    "load_control": load_control.SIGNATURE,
-    "allocation": allocation.SIGNATURE,
-    "position_control": position_control.SIGNATURE,
-    "attitude_control": attitude_control.SIGNATURE,
-    "plant": plant.STEP_SIGNATURE,
-}
-EVERY = [(layer, name) for layer in part.LAYERS for name in part.names(layer)]
+SIGNATURES = {**KERNEL_SIGNATURES, "disturbance": {"kernel": disturbance.SIGNATURE}}
+EVERY = [(layer, name) for layer in (*part.LAYERS, "disturbance") for name in part.names(layer)]
+FAULTS = part.names("fault")
 IDS = [f"{layer}/{name}" for layer, name in EVERY]
 needs_jit = pytest.mark.skipif(not jit.JIT_ENABLED, reason="compiled kernels only")
 
 
 def mission_with(layer, name, **overrides):
     table = {"name": "test", "reference": {"kind": "spiral"}, "timing": {"duration": 1.2}}
-    table[layer] = {"kind": name}
+    table[layer] = [{"kind": name}] if layer in part.LISTS else {"kind": name}
     return load_mission(table, overrides)
 
 
-def test_every_layer_has_a_part():
-    assert set(SIGNATURES) == set(part.LAYERS)
-    assert {layer for layer, _ in EVERY} == set(part.LAYERS)
+def test_every_folder_has_a_part():
+    assert tuple(KERNEL_SIGNATURES) == part.LAYERS
+    assert {layer for layer, _ in EVERY} | {"fault"} == set(part.FOLDERS)
+    assert FAULTS
 
 
 @pytest.mark.parametrize(("layer", "name"), EVERY, ids=IDS)
@@ -70,9 +63,8 @@ class TestEveryPart:
         found = part.find(layer, name)
         if found.needs:
             pytest.skip("a plain Python kernel")
-        assert found.kernel.nopython_signatures == [SIGNATURES[layer]]
-        if layer == "plant":
-            assert found.observe.nopython_signatures == [plant.OBSERVE_SIGNATURE]
+        for function, wanted in SIGNATURES[layer].items():
+            assert getattr(found, function).nopython_signatures == [wanted]
 
     @pytest.mark.parametrize("n", [1, 2, 4, 11])
     def test_params_and_memory_are_vectors(self, layer, name, n):
@@ -107,7 +99,9 @@ class TestEveryPart:
         mission = mission_with(layer, name)
         again = load_mission(mission.resolved())
         assert getattr(again, layer) == getattr(mission, layer)
-        assert again.kinds[layer] == name
+        assert again.resolved() == mission.resolved()
+        kinds = {**again.kinds, **again.list_kinds}
+        assert kinds[layer] == ([name] if layer in part.LISTS else name)
 
     def test_flies_with_its_defaults(self, layer, name):
         recording = Flight(mission_with(layer, name, **{"timing.duration": 0.3})).run()
@@ -133,10 +127,42 @@ class TestEveryPart:
         assert allocations(110) == allocations(1110)
 
 
+@pytest.mark.parametrize("name", FAULTS)
+class TestEveryFault:
+    """What breaks in flight."""
+
+    def test_is_documented_and_survives_a_mission_file(self, name):
+        found = part.find("fault", name)
+        assert found.layer == "fault"
+        assert found.__doc__
+        mission = mission_with("fault", name)
+        assert load_mission(mission.resolved()).resolved() == mission.resolved()
+
+    def test_changes_conditions_only_and_by_the_seed(self, name):
+        settings, n = part.find("fault", name)(), 5
+        resolved = [settings.resolve(np.random.default_rng(k), n, 8.0) for k in (0, 0, 1, 2, 3)]
+        assert resolved[0] == resolved[1]
+        assert len({str(each) for each in resolved}) > 1
+        for change in (change for each in resolved for change in each):
+            assert change.signal in CONDITIONS
+            assert change.drone is None or 0 <= change.drone < n
+            assert change.at >= 0.0
+        fixed = part.find("fault", name)(at=2.0, drone=3).resolve(np.random.default_rng(0), n, 8.0)
+        assert min(change.at for change in fixed) == 2.0
+        assert {change.drone for change in fixed} <= {3, None}
+
+    def test_does_not_stop_the_flight(self, name):
+        table = {"name": "test", "reference": {"kind": "hover"}, "timing": {"duration": 0.4}}
+        table["fault"] = [{"kind": name, "at": 0.2, "drone": 1}]
+        recording = Flight(load_mission(table)).run()
+        assert recording.outcome == "completed"
+        assert len(recording.time) == 81
+
+
 # ---------------------------------------------------------------- discovery
 
 
-@pytest.mark.parametrize("layer", part.LAYERS)
+@pytest.mark.parametrize("layer", part.FOLDERS)
 def test_unknown_name_lists_the_valid_ones_and_the_nearest(layer):
     valid = part.names(layer)
     misspelt = valid[0] + "x"
@@ -156,7 +182,7 @@ def test_unknown_layer():
 
 
 def test_helpers_are_not_parts():
-    for layer in part.LAYERS:
+    for layer in part.FOLDERS:
         assert not {"base", "-fixed", "_fixed", "--init--"} & set(part.names(layer))
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import enum
 import operator
-from collections.abc import Sequence
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -61,6 +60,8 @@ class Status(enum.IntEnum):
     """The start broke a limit: the cables are on their way back, none worse than it was."""
     PUSHING = 8
     """A tension came out negative and is shown on the opposite side: a drone below the load."""
+    SILENT = 9
+    """The allocator was not heard: the drones hold what they have. Of the loop, not of an allocator."""
 
     @property
     def ok(self) -> bool:
@@ -72,10 +73,6 @@ class AllocatorPart(Part):
     """Base of all allocators: settings, kernel with :data:`SIGNATURE`, parameters and memory."""
 
     layer: ClassVar[str] = "allocation"
-
-    def of(self, drones: Sequence[int]) -> AllocatorPart:
-        """Settings for the team of these drones; one with values per cable keeps theirs."""
-        return self
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -294,7 +294,7 @@ class Safe(AllocatorPart):
                 )
         return problems + feasible.conflicts_of(team, self)
 
-    def of(self, drones: Sequence[int]) -> Safe:
+    def of(self, drones: Sequence[int]) -> Self:
         lists = {
             name: [value[drone] for drone in drones]
             for name in ("tension_min", "tension_max", "max_thrust", "weights")

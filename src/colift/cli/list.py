@@ -14,10 +14,10 @@ def list_(
 ) -> None:
     """Name the shipped missions and the parts of every layer."""
     from colift.mission.load import mission_names, read_source
-    from colift.part import LAYERS, names
+    from colift.part import FOLDERS, names
 
     missions = {name: read_source(name)[1].get("description", "") for name in mission_names()}
-    parts = {layer: names(layer) for layer in LAYERS}
+    parts = {layer: names(layer) for layer in FOLDERS}
     if as_json:
         emit({"missions": missions, "parts": parts})
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ from rich.table import Table
 
 from colift.cli.base import (
     EXIT_DIVERGED,
+    EXIT_FAILED,
     Json,
     Sets,
     With,
@@ -41,6 +43,8 @@ def run(
 ) -> None:
     """Fly a mission; print what happened; write recording, metrics and report.
 
+    Exit code 3 if the flight diverged, 4 if it missed one of the mission's criteria.
+
     [bold]Examples[/bold]
 
       colift run
@@ -62,6 +66,7 @@ def run(
         )
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
+    judged = metrics.judge(flown.recording, flown.metrics)
     target = folder or new_folder(loaded.name)
     files = write_results(flown, target, report=report)
     if as_json:
@@ -71,6 +76,7 @@ def run(
                 "outcome": flown.recording.outcome,
                 "summary": metrics.verdict(flown.recording, flown.metrics)[1],
                 "metrics": flown.metrics,
+                "criteria": [asdict(each) for each in judged],
                 "loop_time_s": flown.loop_time,
                 "compiled": flown.compiled,
                 "files": {name: str(path) for name, path in files.items()},
@@ -91,6 +97,10 @@ def run(
         level, sentence = metrics.verdict(flown.recording, flown.metrics)
         colour = {"good": "green", "warn": "yellow", "bad": "red"}[level]
         out.print(f"[{colour}]{escape(sentence)}[/{colour}]")
+        for each in judged:
+            mark = "[green]pass[/green]" if each.holds else "[red]FAIL[/red]"
+            value = "" if each.metric == "outcome" else f" = {each.value:.4g}"
+            out.print(f"{mark} {escape(f'{each.metric}{value}: {each.bound}')}", highlight=False)
         simulated = loaded.timing.duration
         how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
         out.print(
@@ -101,3 +111,5 @@ def run(
             out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
     if flown.recording.outcome != "completed":
         raise typer.Exit(EXIT_DIVERGED)
+    if not all(each.holds for each in judged):
+        raise typer.Exit(EXIT_FAILED)

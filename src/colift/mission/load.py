@@ -6,32 +6,31 @@ import difflib
 import importlib.resources
 import json
 import os.path
-import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import ValidationError
 
 from colift.errors import MissionError, Problem, UnknownNameError
-from colift.mission.schema import Frame, Mission, Section
-from colift.part import LAYERS, Part, find, names
-from colift.simulation.signals import columns
+from colift.mission.checks import cross_checks
+from colift.mission.schema import Frame, Mission
+from colift.mission.wording import parse, problems_of, shown
+from colift.part import LAYERS, LISTS, Part, find, names
 
 DEFAULT_KINDS = {
+    "sensing": "ideal",
+    "estimation": "none",
     "load_control": "pid",
     "allocation": "safe",
+    "link": "ideal",
     "position_control": "pid",
     "attitude_control": "manifold",
+    "actuation": "ideal",
+    "detection": "none",
     "plant": "rigid-cables",
 }
-MAX_RECORDING = 4e9
-"""Bytes that a flight may record; it is held in memory."""
-
-Model = TypeVar("Model", bound=BaseModel)
 
 
 def mission_names() -> list[str]:
@@ -126,11 +125,17 @@ def _override(table: dict[str, Any], path: str, value: Any) -> Problem | None:
     *parents, leaf = path.split(".")
     node: Any = table
     for depth, key in enumerate(parents):
-        node = node.setdefault(key, {}) if isinstance(node, dict) else None
-        if not isinstance(node, dict):
-            return Problem(
-                ".".join(parents[: depth + 1]), "", "is not a table; cannot set a key in it"
-            )
+        if isinstance(node, list) and key.isdecimal() and int(key) < len(node):
+            node = node[int(key)]
+        else:
+            node = node.setdefault(key, {}) if isinstance(node, dict) else None
+        if not isinstance(node, dict | list):
+            where = ".".join(parents[: depth + 1])
+            return Problem(where, "", "is not a table; cannot set a key in it")
+    if not isinstance(node, dict):
+        return Problem(
+            path, "", f"{'.'.join(parents)} is a list of {len(node)}; name one by its number"
+        )
     before = node.get("kind", DEFAULT_KINDS.get(parents[-1] if parents else ""))
     if leaf == "kind" and before not in (None, value):
         node.clear()  # the settings of another part mean nothing to this one
@@ -146,202 +151,63 @@ def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
     return dict(json.loads(plain.encode("utf-8", "replace")))
 
 
-def _parse(model: type[Model], table: Mapping[str, Any]) -> Model:
-    """Validate plain data strictly: neither "1" nor true is a number."""
-    return model.model_validate_json(json.dumps(table), strict=True)
-
-
 def _validate(table: dict[str, Any], problems: list[Problem]) -> Mission | None:
     """Validate section by section, so that a mistake in one does not hide those in others."""
     parts: dict[str, Part] = {}
     kinds: dict[str, str] = {}
     rest = dict(table)
     for layer in LAYERS:
-        section = rest.pop(layer, {})
-        if not isinstance(section, dict):
-            problems.append(Problem(layer, _shown(section), "must be a table"))
-            continue
-        settings = dict(section)
-        kind = settings.pop("kind", DEFAULT_KINDS.get(layer))
-        if kind is None:
-            valid = ", ".join(names(layer))
-            problems.append(Problem(f"{layer}.kind", "", f"is required: one of {valid}"))
-            continue
-        try:
-            part = find(layer, str(kind))
-        except UnknownNameError as error:
-            near = difflib.get_close_matches(str(kind), error.valid, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            valid = ", ".join(error.valid)
-            problems.append(Problem(f"{layer}.kind", _shown(kind), f"must be one of {valid}{hint}"))
-            continue
-        try:
-            parts[layer] = _parse(part, settings)
-            kinds[layer] = str(kind)
-        except ValidationError as error:
-            problems.extend(_problems(error, part, settings, layer))
+        found = _part(layer, rest.pop(layer, {}), layer, problems)
+        if found is not None:
+            kinds[layer], parts[layer] = found
+    lists: dict[str, list[Part]] = {}
+    list_kinds: dict[str, list[str]] = {}
+    for name in LISTS:
+        sections = rest.pop(name, [])
+        if not isinstance(sections, list):
+            problems.append(Problem(name, shown(sections), f"must be a list of tables, [[{name}]]"))
+            sections = []
+        each = [_part(name, section, f"{name}.{i}", problems) for i, section in enumerate(sections)]
+        list_kinds[name] = [item[0] for item in each if item]
+        lists[name] = [item[1] for item in each if item]
     broken: set[str] = set()
     try:
-        frame = _parse(Frame, rest)
+        frame = parse(Frame, rest)
     except ValidationError as error:
-        found = _problems(error, Frame, rest)
-        problems.extend(found)
-        broken = {problem.path.partition(".")[0] for problem in found}
+        mistakes = problems_of(error, Frame, rest)
+        problems.extend(mistakes)
+        broken = {problem.path.partition(".")[0] for problem in mistakes}
         intact = {key: value for key, value in rest.items() if key not in broken}
-        frame = _parse(Frame, {"name": "?", **intact})
-    problems.extend(_cross_checks(frame, parts, broken))
+        frame = parse(Frame, {"name": "?", **intact})
+    problems.extend(cross_checks(frame, parts, lists, broken))
     if problems:
         return None
-    return Mission.model_validate({**dict(frame), **parts, "kinds": kinds})
+    return Mission.model_validate(
+        {**dict(frame), **parts, **lists, "kinds": kinds, "list_kinds": list_kinds}
+    )
 
 
-def _cross_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> Iterable[Problem]:
-    """Mistakes between fields; ``broken`` sections stand at their defaults and are left out."""
-    for name, section in frame:
-        if isinstance(section, Section):
-            for field, value, message in section.problems():
-                broken.add(name)
-                yield Problem(f"{name}.{field}", value, message)
-    n, timing = frame.drones.count, frame.timing
-    given = frame.start.directions
-    if "drones" not in broken and given is not None and len(given) != n:
-        yield Problem("start.directions", f"{len(given)} directions", f"must be drones.count = {n}")
-    if not broken & {"drones", "timing"}:
-        width = max(part.stop for part in columns(n).values())
-        size = 8.0 * width * timing.duration / timing.recording
-        size += 80.0 * timing.duration / timing.allocation
-        if size > MAX_RECORDING:
-            limit = f"{MAX_RECORDING / 1e9:g} GB; shorten timing.duration or lengthen the periods"
-            yield Problem(
-                "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
-            )
-    left = set(range(n))
-    if all(type(e.value) is int for e in frame.events if e.field.startswith("drones.")):
-        left = set(frame.first_drones())
-    for i, event in sorted(enumerate(frame.events), key=lambda pair: pair[1].at):
-        if "timing" not in broken and event.at > timing.duration:
-            yield Problem(
-                f"events.{i}.at",
-                f"{event.at:g}",
-                f"must be within timing.duration = {timing.duration:g} s",
-            )
-        section, _, name = event.field.partition(".")
-        if section == "drones" and "drones" not in broken:
-            if name == "join":
-                away = sorted(set(range(n)) - left)
-                if type(event.value) is not int or event.value not in away:
-                    others = ", ".join(map(str, away)) or "none"
-                    message = f"must be one of the drones that do not fly then ({others})"
-                    yield Problem(f"events.{i}.value", repr(event.value), message)
-                else:
-                    left.add(event.value)
-            elif type(event.value) is not int or event.value not in left or len(left) == 1:
-                flying = ", ".join(map(str, sorted(left)))
-                message = f"must be one of the drones that fly then ({flying}), not the last one"
-                yield Problem(f"events.{i}.value", repr(event.value), message)
-            else:
-                left.remove(event.value)
-            continue
-        model = frame.load if section == "load" else parts.get(section)
-        if model is None:
-            continue
-        changed = {**model.model_dump(mode="json"), name: event.value}
-        try:
-            _parse(type(model), changed)
-        except ValidationError as error:
-            for problem in _problems(error, type(model), changed, section):
-                yield Problem(f"events.{i}", problem.value, f"{problem.path} {problem.message}")
-    if not broken & {"world", "load", "drones"}:
-        for layer, part in parts.items():
-            if message := part.missing():
-                yield Problem(f"{layer}.kind", "", message)
-            for field, message in part.check(frame.team):
-                yield Problem(f"{layer}.{field}", "", message)
-
-
-def _problems(
-    error: ValidationError, model: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
-) -> list[Problem]:
-    """One problem a place; of what a union's members say, the most specific."""
-    found: dict[str, Problem] = {}
-    for details in error.errors(include_url=False):
-        problem = _problem(details, model, table, prefix)
-        earlier = found.get(problem.path)
-        if earlier and not _is_short(details) and earlier.message != problem.message:
-            problem = replace(problem, message=f"{earlier.message}, or {problem.message}")
-        found[problem.path] = problem
-    return [p for path, p in found.items() if not any(f.startswith(f"{path}.") for f in found)]
-
-
-_WORDS = {
-    "model_type": "must be a table",
-    "dict_type": "must be a table",
-    "list_type": "must be a list",
-    "tuple_type": "must be a list",
-    "float_type": "must be a number",
-    "int_type": "must be a whole number",
-    "bool_type": "must be true or false",
-    "string_type": "must be text",
-    "too_long": "must have at most {max_length} values",
-    "too_short": "must have at least {min_length} values",
-    "missing": "is required",
-}
-
-
-def _problem(
-    details: ErrorDetails, model: type[BaseModel], table: Mapping[str, Any], prefix: str
-) -> Problem:
-    location, value = _location(details["loc"], table), _shown(details["input"])
-    if details["type"] == "extra_forbidden":
-        value = ""
-        valid = _valid_keys(model, location[:-1])
-        near = difflib.get_close_matches(location[-1], valid, n=1, cutoff=0.5)
+def _part(layer: str, section: Any, path: str, problems: list[Problem]) -> tuple[str, Part] | None:
+    """Name and settings of the part that a section asks for; None, and problems, where it cannot."""
+    if not isinstance(section, dict):
+        problems.append(Problem(path, shown(section), "must be a table"))
+        return None
+    settings = dict(section)
+    kind = settings.pop("kind", DEFAULT_KINDS.get(layer))
+    if kind is None:
+        valid = ", ".join(names(layer))
+        problems.append(Problem(f"{path}.kind", "", f"is required: one of {valid}"))
+        return None
+    try:
+        part = find(layer, str(kind))
+    except UnknownNameError as error:
+        near = difflib.get_close_matches(str(kind), error.valid, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        message = f"unknown key{hint} (valid: {', '.join(valid)})"
-    elif _is_short(details):
-        message = f"must have at least {int(details['loc'][-1]) + 1} values"
-    elif details["type"] in _WORDS:
-        message = _WORDS[details["type"]].format(**details.get("ctx", {}))
-        if details["type"] == "missing":
-            location, value = [*location, str(details["loc"][-1])], ""
-    else:
-        message = details["msg"].removeprefix("Value error, ")
-        message = re.sub("^[A-Z][a-z]+ should", "must", message)
-    return Problem(".".join(([prefix] if prefix else []) + location), value, message)
-
-
-def _is_short(details: ErrorDetails) -> bool:
-    """Whether an item of a list of fixed length is missing; of several, the last tells the length."""
-    return details["type"] == "missing" and isinstance(details["loc"][-1], int)
-
-
-def _location(keys: Sequence[int | str], table: Any) -> list[str]:
-    """The keys that are in the file; pydantic puts the names of union members between them."""
-    found = []
-    for key in keys:
-        inside = isinstance(table, dict) and key in table
-        if inside or (isinstance(table, list) and isinstance(key, int) and key < len(table)):
-            table = table[key]
-            found.append(str(key))
-    return found
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
-
-
-def _valid_keys(model: type[BaseModel], location: list[str]) -> list[str]:
-    """Keys that may stand in the table at ``location``."""
-    if model is Frame and not location:
-        return [*Frame.model_fields, *LAYERS]
-    current: Any = model
-    for key in location:
-        field = current.model_fields.get(key) if hasattr(current, "model_fields") else None
-        if field is None:
-            continue
-        annotation = field.annotation
-        arguments = getattr(annotation, "__args__", ())
-        current = next((a for a in arguments if hasattr(a, "model_fields")), annotation)
-    keys = list(getattr(current, "model_fields", {}))
-    return keys + (["kind"] if isinstance(current, type) and issubclass(current, Part) else [])
+        valid = ", ".join(error.valid)
+        problems.append(Problem(f"{path}.kind", shown(kind), f"must be one of {valid}{hint}"))
+        return None
+    try:
+        return str(kind), parse(part, settings)
+    except ValidationError as error:
+        problems.extend(problems_of(error, part, settings, path))
+        return None

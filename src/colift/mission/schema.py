@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, SerializeAsAny, Tag
 
+from colift.actuation.base import ActuationPart
 from colift.allocation.base import AllocatorPart
 from colift.attitude_control.base import AttitudeControlPart
+from colift.detection.base import DetectionPart
+from colift.disturbance.base import DisturbancePart
+from colift.estimation.base import EstimationPart
+from colift.fault.base import FaultPart
 from colift.geometry import ring
+from colift.link.base import LinkPart
 from colift.load_control.base import LoadControlPart
-from colift.part import Vector
+from colift.part import LAYERS, LISTS, Vector
 from colift.plant.base import PlantPart
 from colift.position_control.base import PositionControlPart
 from colift.reference.base import ReferencePart
+from colift.sensing.base import SensingPart
 from colift.team import Team
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -42,6 +50,11 @@ InertiaForEach = Annotated[list[Inertia], Tag("each")]
 InertiaPerDrone = Annotated[Annotated[Inertia, Tag("all")] | InertiaForEach, _per_drone(1)]
 
 
+Factor = Annotated[float, Field(gt=0.01, le=100.0)]
+_FactorForEach = Annotated[list[Factor], Tag("each")]
+FactorPerDrone = Annotated[Annotated[Factor, Tag("all")] | _FactorForEach, _per_drone(0)]
+
+
 class Section(BaseModel):
     """A table of a mission file: unknown keys are errors, numbers are finite."""
 
@@ -52,6 +65,16 @@ class Section(BaseModel):
     def problems(self) -> list[tuple[str, str, str]]:
         """Mistakes in how the fields go together, as ``(field, value, message)``."""
         return []
+
+    def wrong_lengths(self, n: int) -> list[tuple[str, str, str]]:
+        """Lists with one value per drone whose length is not the number of drones."""
+        values = ((name, getattr(self, name)) for name in type(self).model_fields)
+        message = f"must be one value or a list of drones.count = {n}"
+        return [
+            (name, f"{len(value)} values", message)
+            for name, value in values
+            if isinstance(value, list) and len(value) != n
+        ]
 
 
 class World(Section):
@@ -82,18 +105,29 @@ class Drones(Section):
 
     def problems(self) -> list[tuple[str, str, str]]:
         """Lists whose length is not the number of drones, and moments that no body has."""
-        found = []
-        for name in ("mass", "inertia", "cable_length"):
-            value = getattr(self, name)
-            if isinstance(value, list) and len(value) != self.count:
-                message = f"must be one value or a list of drones.count = {self.count}"
-                found.append((name, f"{len(value)} values", message))
+        found = self.wrong_lengths(self.count)
         for row in self.inertia if isinstance(self.inertia, list) else [self.inertia]:
             if max(row) > sum(row) - max(row) + 1e-9 * sum(row):
                 message = "no body has these: each moment must be at most the sum of the other two"
                 found.append(("inertia", str(list(row)), message))
                 break
         return found
+
+
+class Truth(Section):
+    """How the real bodies differ from what the controllers are told: factors of the nominal values.
+
+    One value for all drones, or a list with one value per drone.
+    """
+
+    load_mass_factor: Factor = 1.0
+    """Of ``load.mass``."""
+    drone_mass_factor: FactorPerDrone = 1.0
+    """Of ``drones.mass``."""
+    inertia_factor: FactorPerDrone = 1.0
+    """Of ``drones.inertia``."""
+    cable_length_factor: FactorPerDrone = 1.0
+    """Of ``drones.cable_length``."""
 
 
 class Start(Section):
@@ -160,18 +194,50 @@ class Timing(Section):
         return round(self.duration / self.step) + 1
 
 
+EVENT_FIELDS = (
+    r"^(load\.mass|drones\.(lose|join)"
+    rf"|({'|'.join(layer for layer in LAYERS if layer not in ('plant', 'reference'))})\.[a-z_]+)$"
+)
+
+
 class Event(Section):
     """A change during the flight: of the truth, unknown to the controllers, or of the allocator."""
 
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
-    field: Annotated[str, Field(pattern=r"^(load\.mass|drones\.(lose|join)|allocation\.[a-z_]+)$")]
-    """What changes: ``load.mass`` (the plant's only), a setting of the allocator, ``drones.lose`` or
-    ``drones.join``."""
+    field: Annotated[str, Field(pattern=EVENT_FIELDS)]
+    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, or a setting of a
+    layer such as ``allocation.mu``; ``allocation.kind`` puts another allocator, with its defaults, in place."""
     value: Any
     """New value, in the field's unit; for ``drones.lose`` the number, from 0, of the drone whose cable is
     cut and that leaves the team, which is told at once; for ``drones.join`` the drone that hooks in then, in
     the widest gap between the cables, at the load's velocity, and that is not there before."""
+
+
+class Bound(Section):
+    """What a number must keep within for the flight to pass; one end may be left open."""
+
+    min: float | None = None
+    """Least value, in the metric's unit."""
+    max: float | None = None
+    """Largest value, in the metric's unit."""
+
+    def problems(self) -> list[tuple[str, str, str]]:
+        """Bounds that bound nothing, or that exclude everything."""
+        if self.min is None and self.max is None:
+            return [("", "", "must give min, max or both")]
+        if self.min is not None and self.max is not None and self.min > self.max:
+            return [("min", f"{self.min:g}", f"must be at most max = {self.max:g}")]
+        return []
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is within; what is not a number is not."""
+        return (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
+
+    def __str__(self) -> str:
+        low = "" if self.min is None else f">= {self.min:g}"
+        high = "" if self.max is None else f"<= {self.max:g}"
+        return " and ".join(filter(None, (low, high)))
 
 
 class Frame(Section):
@@ -186,10 +252,13 @@ class Frame(Section):
     world: World = World()
     load: Load = Load()
     drones: Drones = Drones()
+    truth: Truth = Truth()
     start: Start = Start()
     timing: Timing = Timing()
     events: list[Event] = []
     """Changes during the flight."""
+    criteria: dict[str, Bound] = {}
+    """What makes the flight a pass: bounds by the name of a metric."""
 
     @property
     def team(self) -> Team:
@@ -202,6 +271,18 @@ class Frame(Section):
             inertias=np.array(np.broadcast_to(inertia, (n, 3))),
             cable_lengths=np.array(np.broadcast_to(drones.cable_length, n), dtype=float),
             gravity=self.world.gravity,
+        )
+
+    @property
+    def true_team(self) -> Team:
+        """The bodies as they are; :attr:`team` is what the controllers are told."""
+        told, truth = self.team, self.truth
+        return replace(
+            told,
+            load_mass=told.load_mass * truth.load_mass_factor,
+            masses=told.masses * truth.drone_mass_factor,
+            inertias=told.inertias * np.reshape(truth.inertia_factor, (-1, 1)),
+            cable_lengths=told.cable_lengths * truth.cable_length_factor,
         )
 
     def first_drones(self) -> list[int]:
@@ -227,16 +308,32 @@ class Mission(Frame):
 
     kinds: dict[str, str]
     """Name of the part in each layer."""
+    list_kinds: dict[str, list[str]]
+    """Names of the disturbances and faults, in their order."""
     reference: SerializeAsAny[ReferencePart]
+    sensing: SerializeAsAny[SensingPart]
+    estimation: SerializeAsAny[EstimationPart]
     load_control: SerializeAsAny[LoadControlPart]
     allocation: SerializeAsAny[AllocatorPart]
+    link: SerializeAsAny[LinkPart]
     position_control: SerializeAsAny[PositionControlPart]
     attitude_control: SerializeAsAny[AttitudeControlPart]
+    actuation: SerializeAsAny[ActuationPart]
+    detection: SerializeAsAny[DetectionPart]
     plant: SerializeAsAny[PlantPart]
+    disturbance: list[SerializeAsAny[DisturbancePart]] = []
+    """Disturbances, all at once."""
+    fault: list[SerializeAsAny[FaultPart]] = []
+    """Faults to come."""
 
     def resolved(self) -> dict[str, Any]:
         """The whole mission with every default filled in, as plain data (a valid mission file)."""
-        data = self.model_dump(mode="json", exclude={"kinds"}, exclude_none=True)
+        data = self.model_dump(mode="json", exclude={"kinds", "list_kinds"}, exclude_none=True)
         for layer, kind in self.kinds.items():
             data[layer] = {"kind": kind, **data[layer]}
+        for name in LISTS:
+            data[name] = [
+                {"kind": kind, **settings}
+                for kind, settings in zip(self.list_kinds[name], data[name], strict=True)
+            ]
         return data

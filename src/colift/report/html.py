@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import tomli_w
 
-from colift.metrics import all_metrics, verdict
+from colift.metrics import Judgement, all_metrics, judge, verdict
 from colift.recording import Recording, atomic_path
 
 if TYPE_CHECKING:
@@ -166,6 +166,7 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
                 f"colift {recording.versions.get('colift', '?')}",
             ]
         ),
+        criteria_table(judge(recording, metrics)),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
         "<h2>Figures</h2>",
@@ -179,6 +180,21 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
         details("Versions", versions),
     ]
     return page(f"{mission.name} - colift", "\n".join(part for part in parts if part))
+
+
+def criteria_table(judged: Sequence[Judgement]) -> str:
+    """The mission's criteria, each with a verdict in words; nothing for a mission without any."""
+    if not judged:
+        return ""
+    rows = []
+    for each in judged:
+        value = "" if each.metric == "outcome" else f"{each.value:.4g}"
+        level, word = ("good", "pass") if each.holds else ("bad", "fail")
+        mark = f'<b class="{level}" style="color:var(--tone)">{word}</b>'
+        rows.append((f"<code>{escape(each.metric)}</code>", value, escape(each.bound), mark))
+    return "<h2>Criteria</h2>" + table(
+        ("Quantity", "Value", "Bound", "Verdict"), rows, numbers=(1,)
+    )
 
 
 def metrics_table(metrics: Mapping[str, float]) -> str:

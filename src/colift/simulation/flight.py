@@ -2,61 +2,107 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from colift.allocation.base import INFO_SIZE
+from colift.disturbance.base import DisturbancePart
+from colift.errors import ColiftError
+from colift.fault.base import Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.mission.schema import Event, Mission
-from colift.part import LAYERS, Vector
+from colift.part import LAYERS, Part, Vector, find
 from colift.plant.base import Start
 from colift.recording import Recording
-from colift.simulation.loop import CYCLE_WIDTH, Periods, Vectors, advance, is_compiled, kernels_of
+from colift.simulation.loop import (
+    CYCLE_WIDTH,
+    Disturbances,
+    Keys,
+    Periods,
+    Vectors,
+    advance,
+    disturbance_kernel,
+    is_compiled,
+    kernels_of,
+)
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus, columns, make_bus
 from colift.team import Team
 
 Progress = Callable[[float], None]
 """Called with the fraction flown, between 0 and 1."""
 
+AnyPart = TypeVar("AnyPart", bound=Part)
+
 CHUNK = 1.0
 """Simulated seconds between two looks at progress and interrupts."""
 
 
 class Flight:
-    """A mission in the air; :meth:`run` flies it to the end.
+    """A mission in the air: :meth:`run` flies it to the end, :meth:`advance` a stretch of it.
+
+    Between two stretches settings may change (:meth:`change`) and drones leave or join (:meth:`regroup`).
 
     Attributes
     ----------
-    compiled : bool
-        Whether every part is compiled, and so the loop.
+    mission : Mission
     loop_time : float
         Wall time spent in the loop so far, s.
+    outcome : str
+        ``"completed"``, or how the flight ended.
+    found : list of (time, drone)
+        Drones that were judged lost by the mission's ``detection``, s.
 
     """
 
     def __init__(self, mission: Mission) -> None:
         self.mission = mission
-        self._kernels = kernels_of({layer: type(getattr(mission, layer)) for layer in LAYERS})
-        self.compiled = all(is_compiled(kernel) for kernel in self._kernels)
         self.loop_time = 0.0
         self.outcome = "completed"
+        self.found: list[tuple[float, int]] = []
         self._step = 0
         self._every = Periods(mission.timing.step, **mission.timing.multiples())
-        self._cycles = np.zeros((self._rows(self._every.allocation), CYCLE_WIDTH))
+        self._keys = Keys(*(random_key(mission.seed, layer) for layer in Keys._fields))
         self._info = np.zeros(INFO_SIZE)
-        self._allocation = mission.allocation
-        self._load_mass = mission.load.mass
+        self._parts: dict[str, Part] = {layer: getattr(mission, layer) for layer in LAYERS}
+        winds_first = sorted(
+            enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
+        )
+        self._disturbances: dict[int, DisturbancePart] = dict(winds_first)
+        self._load_mass = mission.true_team.load_mass
+        self._due = sorted(timetable(mission), key=lambda item: item[0])
         self._legs: list[_Leg] = []
         drones = mission.first_drones()
-        team = mission.team.of(drones)
         start = start_state(mission)
-        self._begin_leg(drones, self._fresh_memory(team, start))
-        self._legs[-1].bus.desired_directions[:] = start.directions
+        self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
+        bus = self.bus
+        bus.desired_directions[:] = start.directions
+        bus.received_directions[:] = start.directions
+
+    @property
+    def time(self) -> float:
+        """Simulated time flown, s."""
+        return self._step * self._every.step
+
+    @property
+    def compiled(self) -> bool:
+        """Whether every part is compiled, and so the loop."""
+        return self._legs[-1].compiled
+
+    @property
+    def bus(self) -> Bus:
+        """All signals now, of the drones that fly (:attr:`drones`)."""
+        return self._legs[-1].bus
+
+    @property
+    def drones(self) -> list[int]:
+        """Numbers of the drones that fly, in the order of the signals."""
+        return self._legs[-1].drones
 
     def run(self, progress: Progress | None = None) -> Recording:
         """Fly from where we are to the end of the mission.
@@ -64,130 +110,62 @@ class Flight:
         A flight whose numbers stop being finite ends there; the recording says so in ``outcome``.
         """
         steps = self.mission.timing.steps
-        for stop in self._stops():
-            for event in self.mission.events:
-                if self._event_step(event) == self._step:
-                    self._apply(event)
-            self._advance(stop)
+        chunk = max(1, round(CHUNK / self._every.step))
+        while self._step < steps and self.outcome == "completed":
+            self._fly_to(min(steps, (self._step // chunk + 1) * chunk))
             if progress is not None:
-                progress(stop / steps)
-            if not np.isfinite(self._legs[-1].bus.row).all():
-                self.outcome = f"diverged before t = {stop * self._every.step:g} s"
-                break
+                progress(self._step / steps)
         return self.recording()
 
-    def recording(self) -> Recording:
-        """What has been recorded so far; NaN for a drone that has left."""
-        every, n = self._every, self.mission.drones.count
-        rows = -(-self._step // every.recording)
-        cycles = -(-self._step // every.allocation)
-        arrays = {s.name: np.full((rows, *s.shape_for(n)), np.nan) for s in SIGNALS}
-        ends = [*(-(-leg.first_step // every.recording) for leg in self._legs[1:]), rows]
-        begin = 0
-        for leg, end in zip(self._legs, ends, strict=True):
-            where = columns(leg.team.n)
-            for s in SIGNALS:
-                values = leg.log[begin:end, where[s.name]]
-                values = values.reshape(end - begin, *s.shape_for(leg.team.n))
-                if s.shape[0] == "n":
-                    arrays[s.name][begin:end, leg.drones] = values
-                elif s.shape[0] == "n+1":
-                    arrays[s.name][begin:end, [*leg.drones, n]] = values
-                else:
-                    arrays[s.name][begin:end] = values
-            begin = end
-        for k, signal in enumerate(CYCLE_SIGNALS):
-            arrays[signal.name] = self._cycles[:cycles, k]
-        return Recording(
-            mission=self.mission,
-            time=np.arange(rows, dtype=np.float64) * (every.recording * every.step),
-            cycle_time=np.arange(cycles, dtype=np.float64) * (every.allocation * every.step),
-            arrays=arrays,
-            outcome=self.outcome,
-        )
+    def advance(self, duration: float) -> None:
+        """Fly on for ``duration`` (s), to the nearest physics step, past the mission's end if need be."""
+        self._fly_to(self._step + round(duration / self._every.step))
 
-    def _fresh_memory(self, team: Team, start: Start) -> dict[str, Vector]:
-        memory = {layer: getattr(self.mission, layer).memory(team) for layer in LAYERS[:-1]}
-        return {**memory, "plant": self.mission.plant.initial(team, start)}
+    def change(self, path: str, value: Any) -> None:
+        """Set a setting from now on: ``allocation.mu``, ``load.mass`` (the truth's), ``disturbance.0.force``.
 
-    def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
-        """From here on these drones of the mission fly; every layer is bound to their team."""
-        parts = {layer: getattr(self.mission, layer) for layer in LAYERS}
-        parts["allocation"] = self._allocation.of(drones)
-        team = self.mission.team.of(drones)
-        bus = make_bus(team.n)
-        self._legs.append(
-            _Leg(
-                first_step=self._step,
-                drones=drones,
-                team=team,
-                bus=bus,
-                params=Vectors(*(parts[layer].params(team) for layer in LAYERS)),
-                memory=Vectors(**memory),
-                log=np.zeros((self._rows(self._every.recording), bus.row.size)),
-            )
-        )
-        self._set_load_mass(self._load_mass)
+        ``allocation.kind`` puts another allocator, with its default settings, in place.
 
-    def _advance(self, stop: int) -> None:
-        loop: Any = advance if self.compiled else getattr(advance, "py_func", advance)
+        Raises
+        ------
+        ValueError
+            Where the part refuses the value (a pydantic ``ValidationError``).
+        ColiftError
+            For a path that is not there, or a setting that cannot change in flight.
+
+        """
         leg = self._legs[-1]
-        begin = time.perf_counter()
-        loop(
-            self._step,
-            stop,
-            self._every,
-            *self._kernels,
-            leg.params,
-            leg.memory,
-            self._info,
-            leg.bus,
-            leg.log,
-            self._cycles,
-        )
-        self.loop_time += time.perf_counter() - begin
-        self._step = stop
-
-    def _rows(self, period: int) -> int:
-        """How often something happens that happens every ``period`` steps, the first included."""
-        return (self.mission.timing.steps - 1) // period + 1
-
-    def _stops(self) -> list[int]:
-        """Steps to come at which the loop pauses: each simulated second, each event, the end."""
-        step, steps = self._every.step, self.mission.timing.steps
-        chunk = max(1, round(CHUNK / step))
-        events = {self._event_step(event) for event in self.mission.events}
-        return sorted(
-            s for s in {*range(chunk, steps, chunk), *events, steps} if self._step < s <= steps
-        )
-
-    def _event_step(self, event: Event) -> int:
-        return round(event.at / self._every.step)
-
-    def _apply(self, event: Event) -> None:
-        """Let an event happen, now."""
-        section, _, name = event.field.partition(".")
-        leg = self._legs[-1]
-        if section == "load":
-            self._set_load_mass(event.value)
-        elif name == "lose":
-            self._regroup([drone for drone in leg.drones if drone != event.value])
-        elif name == "join":
-            self._regroup(sorted([*leg.drones, event.value]))
+        section, _, name = path.partition(".")
+        if path == "load.mass":
+            self._load_mass = float(value)
+            leg.params.plant[:] = self.mission.plant.params(self._true_team(leg.drones))
+        elif path == "allocation.kind":
+            self._parts["allocation"] = find("allocation", value)()
+            self.regroup(self.drones, anew={"allocation"})
+        elif section == "disturbance":
+            number, _, name = name.partition(".")
+            if not number.isdecimal() or int(number) not in self._disturbances:
+                raise ColiftError(f"{path}: there is no such disturbance")
+            place = list(self._disturbances).index(int(number))
+            disturbance = _with(self._disturbances[int(number)], name, value)
+            packed = disturbance.of(leg.drones).params(leg.team)
+            _refill(leg.disturbances.params[place], packed, path)
+            self._disturbances[int(number)] = disturbance
+        elif section in self._parts and section != "plant":
+            part = _with(self._parts[section], name, value)
+            _refill(getattr(leg.params, section), part.of(leg.drones).params(leg.team), path)
+            self._parts[section] = part
         else:
-            self._allocation = self._allocation.model_copy(update={name: event.value})
-            leg.params.allocation[:] = self._allocation.of(leg.drones).params(leg.team)
+            raise ColiftError(f"{path}: there is no such setting")
 
-    def _set_load_mass(self, mass: float) -> None:
-        self._load_mass = mass
-        leg = self._legs[-1]
-        leg.params.plant[:] = self.mission.plant.params(replace(leg.team, load_mass=mass))
+    def regroup(self, drones: list[int], anew: set[str] | None = None) -> None:
+        """Go on with these drones: who is missing has its cable cut, who is new hangs on a taut one.
 
-    def _regroup(self, drones: list[int]) -> None:
-        """Go on with these drones: who is missing has its cable cut, who is new hangs on a taut one."""
+        The layers in ``anew`` forget what they remember.
+        """
         old = self._legs[-1]
         team = self.mission.team.of(drones)
-        places = np.array([old.drones.index(d) if d in old.drones else -1 for d in drones])
+        places = _places(old.drones, drones)
         stay, new = places[places >= 0], places < 0
         directions = np.zeros((team.n, 3))
         directions[~new] = old.bus.directions[stay]
@@ -201,13 +179,13 @@ class Flight:
             attitudes=np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1)),
         )
         memory = {
-            layer: getattr(self.mission, layer).carry_over(
-                getattr(old.memory, layer), fresh, places
-            )
+            layer: fresh
+            if layer in (anew or ())
+            else self._parts[layer].carry_over(getattr(old.memory, layer), fresh, places)
             for layer, fresh in self._fresh_memory(team, start).items()
         }
         self._begin_leg(drones, memory)
-        bus = self._legs[-1].bus
+        bus = self.bus
         for signal in SIGNALS:
             now, before = getattr(bus, signal.name), getattr(old.bus, signal.name)
             if signal.shape[0] in {"n", "n+1"}:
@@ -215,20 +193,176 @@ class Flight:
                 now[team.n :] = before[len(old.drones) :]
             else:
                 now[:] = before
-        bus.desired_directions[new] = directions[new]
+        bus.desired_directions[new] = bus.received_directions[new] = directions[new]
+
+    def recording(self) -> Recording:
+        """What has been recorded so far; NaN for a drone that has left."""
+        every, n = self._every, self.mission.drones.count
+        rows = -(-self._step // every.recording)
+        arrays = {s.name: np.full((rows, *s.shape_for(n)), np.nan) for s in SIGNALS}
+        begin = 0
+        for leg in self._legs:
+            log = np.concatenate(leg.log) if leg.log else np.zeros((0, leg.bus.row.size))
+            end = begin + len(log)
+            where = columns(leg.team.n)
+            for s in SIGNALS:
+                values = log[:, where[s.name]].reshape(len(log), *s.shape_for(leg.team.n))
+                if s.shape[0] == "n":
+                    arrays[s.name][begin:end, leg.drones] = values
+                elif s.shape[0] == "n+1":
+                    arrays[s.name][begin:end, [*leg.drones, n]] = values
+                else:
+                    arrays[s.name][begin:end] = values
+            begin = end
+        cycles = np.concatenate([block for leg in self._legs for block in leg.cycles])
+        for k, signal in enumerate(CYCLE_SIGNALS):
+            arrays[signal.name] = cycles[:, k]
+        return Recording(
+            mission=self.mission,
+            time=np.arange(rows, dtype=np.float64) * (every.recording * every.step),
+            cycle_time=np.arange(len(cycles), dtype=np.float64) * (every.allocation * every.step),
+            arrays=arrays,
+            outcome=self.outcome,
+        )
+
+    def _fly_to(self, stop: int) -> None:
+        """Fly to a step; on the way apply what is due, and regroup when a drone is judged lost."""
+        while self._step < stop and self.outcome == "completed":
+            while self._due and self._due[0][0] <= self._step:
+                self._apply(self._due.pop(0)[1])
+            self._advance(min(stop, self._due[0][0]) if self._due else stop)
+            leg = self._legs[-1]
+            if not np.isfinite(leg.bus.row).all():
+                self.outcome = f"diverged before t = {self.time:g} s"
+            elif not leg.bus.carrying.all():
+                lost = [d for d, ok in zip(leg.drones, leg.bus.carrying, strict=True) if not ok]
+                self.found += [(self.time, drone) for drone in lost]
+                rest = [drone for drone in leg.drones if drone not in lost]
+                if rest:
+                    self.regroup(rest)
+                else:
+                    self.outcome = f"no drone left to carry at t = {self.time:g} s"
+
+    def _advance(self, stop: int) -> None:
+        """Run the loop up to a step, or until it ends early; keep what it recorded."""
+        leg, every = self._legs[-1], self._every
+        loop: Any = advance if leg.compiled else getattr(advance, "py_func", advance)
+        log = np.zeros((_due_rows(self._step, stop, every.recording), leg.bus.row.size))
+        cycles = np.zeros((_due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
+        begin = time.perf_counter()
+        reached = loop(
+            self._step, stop, every, self._keys, *leg.kernels, *leg.disturbances.arguments(),
+            leg.params, leg.memory, self._info, leg.bus, log, cycles,
+        )  # fmt: skip
+        self.loop_time += time.perf_counter() - begin
+        leg.log.append(log[: _due_rows(self._step, reached, every.recording)])
+        leg.cycles.append(cycles[: _due_rows(self._step, reached, every.allocation)])
+        self._step = reached
+
+    def _apply(self, due: Event | Change) -> None:
+        """Let an event or a fault happen, now."""
+        drones = self.drones
+        if isinstance(due, Change):
+            signal = getattr(self.bus, due.signal)
+            if due.drone is None:
+                signal[...] = due.value
+            elif due.drone in drones:
+                signal[drones.index(due.drone)] = due.value
+        elif due.field == "drones.lose":
+            if due.value in drones and len(drones) > 1:
+                self.regroup([drone for drone in drones if drone != due.value])
+        elif due.field == "drones.join":
+            self.regroup(sorted([*drones, due.value]))
+        else:
+            self.change(due.field, due.value)
+
+    def _fresh_memory(self, team: Team, start: Start) -> dict[str, Vector]:
+        memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
+        return {**memory, "plant": self.mission.plant.initial(team, start)}
+
+    def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
+        """From here on these drones of the mission fly; every layer is bound to their team."""
+        old, team = self._legs[-1] if self._legs else None, self.mission.team.of(drones)
+        disturbances = []
+        for place, (number, part) in enumerate(self._disturbances.items()):
+            remembered = part.memory(team)
+            if old is not None:
+                before = old.disturbances.memory[place]
+                remembered = part.carry_over(before, remembered, _places(old.drones, drones))
+            key = random_key(self.mission.seed, f"disturbance.{number}")
+            packed = part.of(drones).params(team)
+            disturbances.append((disturbance_kernel(type(part)), key, packed, remembered))
+        kernels = kernels_of({layer: type(part) for layer, part in self._parts.items()})
+        params = {layer: self._parts[layer].of(drones).params(team) for layer in LAYERS[:-1]}
+        params["plant"] = self.mission.plant.params(self._true_team(drones))
+        self._legs.append(
+            _Leg(
+                drones=drones,
+                team=team,
+                bus=make_bus(team.n),
+                kernels=kernels,
+                compiled=all(map(is_compiled, [*kernels, *(each[0] for each in disturbances)])),
+                disturbances=Disturbances.of(disturbances),
+                params=Vectors(**params),
+                memory=Vectors(**memory),
+            )
+        )
+
+    def _true_team(self, drones: list[int]) -> Team:
+        return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
 
 
 @dataclass(frozen=True)
 class _Leg:
-    """A stretch of the flight with the same drones, and what the loop needs for it."""
+    """A stretch of the flight with the same drones and parts, what the loop needs, what it recorded."""
 
-    first_step: int
     drones: list[int]
     team: Team
     bus: Bus
+    kernels: list[Any]
+    compiled: bool
+    disturbances: Disturbances
     params: Vectors
     memory: Vectors
-    log: NDArray[np.float64]
+    log: list[NDArray[np.float64]] = field(default_factory=list)
+    cycles: list[NDArray[np.float64]] = field(default_factory=list)
+
+
+def timetable(mission: Mission) -> list[tuple[int, Event | Change]]:
+    """Events and the changes that faults make, each with its step."""
+    due: list[tuple[float, Event | Change]] = [(event.at, event) for event in mission.events]
+    for number, fault in enumerate(mission.fault):
+        rng = np.random.default_rng([mission.seed, number])
+        found = fault.resolve(rng, mission.drones.count, mission.timing.duration)
+        due += [(change.at, change) for change in found]
+    return [(round(at / mission.timing.step), item) for at, item in due]
+
+
+def random_key(seed: int, name: str) -> int:
+    """Key of one part's random numbers (:mod:`colift.math.noise`)."""
+    digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
+    return int.from_bytes(digest[:8], "big") >> 1
+
+
+def _due_rows(first: int, stop: int, period: int) -> int:
+    """How many of the steps ``first <= k < stop`` are whole multiples of the period."""
+    return -(-stop // period) - -(-first // period)
+
+
+def _places(old: list[int], new: list[int]) -> NDArray[np.int64]:
+    """Place that each new drone had among the old ones, or -1."""
+    return np.array([old.index(drone) if drone in old else -1 for drone in new])
+
+
+def _with(part: AnyPart, name: str, value: Any) -> AnyPart:
+    """A copy with one setting changed, validated."""
+    return type(part).model_validate({**part.model_dump(), name: value})
+
+
+def _refill(vector: Vector, packed: Vector, path: str) -> None:
+    if packed.shape != vector.shape:
+        raise ColiftError(f"{path}: cannot change in flight")
+    vector[:] = packed
 
 
 def start_state(mission: Mission) -> Start:

@@ -58,8 +58,30 @@ SIGNALS = (
     Signal("external_forces", ("n+1", 3), "N", "d", "world", "disturbing forces on the drones and, last row, the load"),
     Signal("attached", ("n",), "1", "-", "-", "1 while a cable holds, 0 once it is cut", initial=1.0),
     Signal("slack_times", ("n",), "s", "-", "-", "time that each cable has spent without tension"),
+    Signal("measured_load", (2, 3), "m, m/s", "-", "world", "load position and velocity as measured"),
+    Signal("measured_positions", ("n", 3), "m", "-", "world", "drone positions as measured"),
+    Signal("measured_velocities", ("n", 3), "m/s", "-", "world", "drone velocities as measured"),
+    Signal("measured_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes as measured, wxyz"),
+    Signal("measured_rates", ("n", 3), "rad/s", "-", "body", "drone body rates as measured"),
+    Signal("estimated_load", (2, 3), "m, m/s", "-", "world", "load position and velocity that the controllers use"),
+    Signal("estimated_positions", ("n", 3), "m", "-", "world", "drone positions that the controllers use"),
+    Signal("estimated_velocities", ("n", 3), "m/s", "-", "world", "drone velocities that the controllers use"),
+    Signal("estimated_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes that the controllers use, wxyz"),
+    Signal("estimated_rates", ("n", 3), "rad/s", "-", "body", "drone body rates that the controllers use"),
+    Signal("received_tensions", ("n",), "N", "-", "-", "wanted tensions that have reached the drones"),
+    Signal("received_directions", ("n", 3), "1", "-", "world", "wanted directions that have reached the drones"),
+    Signal("applied_thrusts", ("n",), "N", "-", "-", "thrusts that act"),
+    Signal("applied_torques", ("n", 3), "N m", "-", "body", "torques that act"),
+    Signal("wind", (3,), "m/s", "-", "world", "velocity of the air"),
+    Signal("carrying", ("n",), "1", "-", "-", "1 for a drone that is taken to carry, 0 once it is judged lost", initial=1.0),
+    Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives", initial=1.0),
+    Signal("stuck", ("n+1",), "1", "-", "-", "1 where the sensors of a drone or, last, the load repeat their last value"),
+    Signal("allocator_up", (1,), "1", "-", "-", "1 where the allocator answers, 0 where it is silent", initial=1.0),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
+
+CONDITIONS = ("attached", "motor_health", "stuck", "allocator_up")
+"""Signals that say what still works; faults change them."""
 
 CYCLE_SIGNALS = (
     Signal("allocator_status", (), "1", "-", "-", "status code of each allocation"),
@@ -105,6 +127,25 @@ class Bus(NamedTuple):
     external_forces: Array
     attached: Array
     slack_times: Array
+    measured_load: Array
+    measured_positions: Array
+    measured_velocities: Array
+    measured_attitudes: Array
+    measured_rates: Array
+    estimated_load: Array
+    estimated_positions: Array
+    estimated_velocities: Array
+    estimated_attitudes: Array
+    estimated_rates: Array
+    received_tensions: Array
+    received_directions: Array
+    applied_thrusts: Array
+    applied_torques: Array
+    wind: Array
+    carrying: Array
+    motor_health: Array
+    stuck: Array
+    allocator_up: Array
 
 
 BUS_TYPE = types.NamedTuple(

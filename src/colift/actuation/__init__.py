@@ -1,0 +1,1 @@
+"""Actuation: from commands to the thrust and torque that act; one file per model."""

@@ -1,0 +1,25 @@
+"""Rotors that do at once what they are told."""
+
+from __future__ import annotations
+
+from colift.actuation.base import SIGNATURE, ActuationPart
+from colift.jit import kernel
+
+
+@kernel(SIGNATURE)
+def _act(  # type: ignore[no-untyped-def]
+    step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts, applied_torques
+):
+    for i in range(thrusts.shape[0]):
+        health = 0.25 * (
+            motor_health[i, 0] + motor_health[i, 1] + motor_health[i, 2] + motor_health[i, 3]
+        )
+        applied_thrusts[i] = health * thrusts[i]
+        for k in range(3):
+            applied_torques[i, k] = health * torques[i, k]
+
+
+class Ideal(ActuationPart):
+    """No lag and no limits; a weak motor takes its quarter from thrust and torque alike; no settings."""
+
+    kernel = _act

@@ -1,0 +1,1 @@
+"""Detection: which drones still carry, judged from measurements; one file per method."""

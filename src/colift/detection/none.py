@@ -1,0 +1,29 @@
+"""No detection: nobody notices a fault that is not announced."""
+
+from __future__ import annotations
+
+from colift.detection.base import SIGNATURE, DetectionPart
+from colift.jit import kernel
+
+
+@kernel(SIGNATURE)
+def _trust(  # type: ignore[no-untyped-def]
+    dt,
+    load,
+    positions,
+    velocities,
+    attitudes,
+    thrusts,
+    tensions,
+    directions,
+    params,
+    memory,
+    carrying,
+):
+    pass
+
+
+class Trusting(DetectionPart):
+    """Every drone is taken to carry; no settings."""
+
+    kernel = _trust

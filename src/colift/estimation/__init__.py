@@ -1,0 +1,1 @@
+"""Estimation: a better guess of the state from what the sensors say; one file per estimator."""

@@ -1,0 +1,47 @@
+"""The contract of faults: a fault is a list of changes to what still works, each at its time.
+
+The changes go to the truth. Nobody tells the controllers: a ``detection`` part may find out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from colift.part import Part
+
+
+class Change(NamedTuple):
+    """``signal[drone] = value`` at a time (s); without a drone the whole signal.
+
+    ``signal`` is one of those of :data:`colift.simulation.signals.CONDITIONS`.
+    """
+
+    at: float
+    signal: str
+    drone: int | None
+    value: Any
+
+
+class FaultPart(Part):
+    """Base of all faults: when, and which drone."""
+
+    layer: ClassVar[str] = "fault"
+
+    at: Annotated[float, Field(ge=0.0)] | Literal["random"] = "random"
+    """Time, s; random: any time of the flight, by the seed."""
+    drone: Annotated[int, Field(ge=0)] | Literal["random"] = "random"
+    """Number of the drone, from 0; random: any of the mission's, by the seed."""
+
+    def changes(self, drone: int, at: float) -> Iterable[Change]:
+        """What it changes when it befalls this drone at this time."""
+        raise NotImplementedError
+
+    def resolve(self, rng: np.random.Generator, n: int, duration: float) -> list[Change]:
+        """The changes of one flight with ``n`` drones."""
+        when, who = float(rng.uniform(0.0, duration)), int(rng.integers(n))
+        at = when if self.at == "random" else self.at
+        return list(self.changes(who if self.drone == "random" else self.drone, at))

@@ -1,0 +1,1 @@
+"""Link: how the allocator's answer reaches the drones; one file per model."""

@@ -1,0 +1,148 @@
+"""Mistakes between the fields of a mission that are each valid alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from colift.errors import Problem, UnknownNameError
+from colift.fault.base import FaultPart
+from colift.mission.schema import Frame, Section
+from colift.mission.wording import parse, problems_of
+from colift.part import Part, find
+from colift.simulation.loop import MAX_DISTURBANCES
+from colift.simulation.signals import columns
+
+MAX_RECORDING = 4e9
+"""Bytes that a flight may record; it is held in memory."""
+
+
+def cross_checks(
+    frame: Frame, parts: Mapping[str, Part], lists: Mapping[str, list[Part]], broken: set[str]
+) -> Iterable[Problem]:
+    """Mistakes between fields; ``broken`` sections stand at their defaults and are left out."""
+    broken = set(broken)
+    for name, section in frame:
+        if isinstance(section, Section):
+            for field, value, message in section.problems():
+                broken.add(name)
+                yield Problem(f"{name}.{field}", value, message)
+    n, timing = frame.drones.count, frame.timing
+    if "drones" not in broken:
+        for field, value, message in frame.truth.wrong_lengths(n):
+            broken.add("truth")
+            yield Problem(f"truth.{field}", value, message)
+        given = frame.start.directions
+        if given is not None and len(given) != n:
+            message = f"must be drones.count = {n}"
+            yield Problem("start.directions", f"{len(given)} directions", message)
+    if not broken & {"drones", "timing"}:
+        width = max(part.stop for part in columns(n).values())
+        size = 8.0 * width * timing.duration / timing.recording
+        size += 80.0 * timing.duration / timing.allocation
+        if size > MAX_RECORDING:
+            limit = f"{MAX_RECORDING / 1e9:g} GB; shorten timing.duration or lengthen the periods"
+            yield Problem(
+                "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
+            )
+    yield from _event_checks(frame, parts, broken)
+    yield from _criteria_checks(frame)
+    if not broken & {"world", "load", "drones"}:
+        for path, part in _with_paths(parts, lists):
+            kind = f"{path}.kind"
+            if message := part.missing():
+                yield Problem(kind, "", message)
+            for field, message in part.check(frame.team):
+                yield Problem(f"{path}.{field}", "", message)
+    if len(lists["disturbance"]) > MAX_DISTURBANCES:
+        message = f"must be at most {MAX_DISTURBANCES}"
+        yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)
+    for i, fault in enumerate(lists["fault"]):
+        assert isinstance(fault, FaultPart)
+        at, drone = fault.at, fault.drone
+        if "timing" not in broken and at != "random" and at > timing.duration:
+            message = f"must be within timing.duration = {timing.duration:g} s"
+            yield Problem(f"fault.{i}.at", f"{at:g}", message)
+        if "drones" not in broken and drone != "random" and drone >= n:
+            yield Problem(f"fault.{i}.drone", str(drone), f"must be one of the drones 0 to {n - 1}")
+
+
+def _criteria_checks(frame: Frame) -> Iterable[Problem]:
+    from colift.metrics import all_metrics  # which reads recordings, and so missions
+
+    valid = [metric.name for metric in all_metrics()]
+    for name, bound in frame.criteria.items():
+        if name not in valid:
+            yield Problem(f"criteria.{name}", "", str(UnknownNameError("metric", name, valid)))
+        for field, value, message in bound.problems():
+            yield Problem(f"criteria.{name}.{field}".rstrip("."), value, message)
+
+
+def _with_paths(
+    parts: Mapping[str, Part], lists: Mapping[str, list[Part]]
+) -> Iterable[tuple[str, Part]]:
+    yield from parts.items()
+    for name, each in lists.items():
+        for i, part in enumerate(each):
+            yield f"{name}.{i}", part
+
+
+def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> Iterable[Problem]:
+    """Mistakes in the events, in the order in which they happen."""
+    n, timing, present = frame.drones.count, frame.timing, dict(parts)
+    left = set(range(n))
+    if all(type(e.value) is int for e in frame.events if e.field.startswith("drones.")):
+        left = set(frame.first_drones())
+    for i, event in sorted(enumerate(frame.events), key=lambda pair: pair[1].at):
+        if "timing" not in broken and event.at > timing.duration:
+            message = f"must be within timing.duration = {timing.duration:g} s"
+            yield Problem(f"events.{i}.at", f"{event.at:g}", message)
+        section, _, name = event.field.partition(".")
+        if section == "drones":
+            if "drones" not in broken:
+                yield from _team_change(f"events.{i}.value", name, event.value, left, n)
+        elif section == "load":
+            yield from _setting_change(f"events.{i}", frame.load, section, name, event.value)
+        elif event.field == "allocation.kind":
+            try:
+                present["allocation"] = find("allocation", str(event.value))()
+            except UnknownNameError as error:
+                yield Problem(f"events.{i}.value", repr(event.value), str(error))
+        elif section in present:
+            if name == "kind":
+                message = "only the allocator can be put in place of another in flight"
+                yield Problem(f"events.{i}.field", event.field, message)
+                continue
+            yield from _setting_change(f"events.{i}", present[section], section, name, event.value)
+
+
+def _team_change(path: str, name: str, value: Any, left: set[int], n: int) -> Iterable[Problem]:
+    """Mistakes of a drone that leaves or joins those that are ``left``, which is brought up to date."""
+    away = set(range(n)) - left
+    if name == "join":
+        if type(value) is int and value in away:
+            left.add(value)
+        else:
+            others = ", ".join(map(str, sorted(away))) or "none"
+            yield Problem(
+                path, repr(value), f"must be one of the drones that do not fly then ({others})"
+            )
+    elif type(value) is int and value in left and len(left) > 1:
+        left.remove(value)
+    else:
+        flying = ", ".join(map(str, sorted(left)))
+        message = f"must be one of the drones that fly then ({flying}), not the last one"
+        yield Problem(path, repr(value), message)
+
+
+def _setting_change(
+    path: str, model: Section | Part, section: str, name: str, value: Any
+) -> Iterable[Problem]:
+    changed = {**model.model_dump(mode="json"), name: value}
+    try:
+        parse(type(model), changed)
+    except ValidationError as error:
+        for problem in problems_of(error, type(model), changed, section):
+            yield Problem(path, problem.value, f"{problem.path} {problem.message}")

@@ -1,0 +1,112 @@
+"""Validate plain data and say in plain words what is wrong with it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from colift.errors import Problem
+from colift.mission.schema import Frame
+from colift.part import FOLDERS, Part
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def parse(model: type[Model], table: Mapping[str, Any]) -> Model:
+    """Validate plain data strictly: neither "1" nor true is a number."""
+    return model.model_validate_json(json.dumps(table), strict=True)
+
+
+def problems_of(
+    error: ValidationError, model: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
+) -> list[Problem]:
+    """One problem a place; of what a union's members say, the most specific."""
+    found: dict[str, Problem] = {}
+    for details in error.errors(include_url=False):
+        problem = _problem(details, model, table, prefix)
+        earlier = found.get(problem.path)
+        if earlier and not _is_short(details) and earlier.message != problem.message:
+            problem = replace(problem, message=f"{earlier.message}, or {problem.message}")
+        found[problem.path] = problem
+    return [p for path, p in found.items() if not any(f.startswith(f"{path}.") for f in found)]
+
+
+_WORDS = {
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "list_type": "must be a list",
+    "tuple_type": "must be a list",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "too_long": "must have at most {max_length} values",
+    "too_short": "must have at least {min_length} values",
+    "missing": "is required",
+}
+
+
+def _problem(
+    details: ErrorDetails, model: type[BaseModel], table: Mapping[str, Any], prefix: str
+) -> Problem:
+    location, value = _location(details["loc"], table), shown(details["input"])
+    if details["type"] == "extra_forbidden":
+        value = ""
+        valid = _valid_keys(model, location[:-1])
+        near = difflib.get_close_matches(location[-1], valid, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        message = f"unknown key{hint} (valid: {', '.join(valid)})"
+    elif _is_short(details):
+        message = f"must have at least {int(details['loc'][-1]) + 1} values"
+    elif details["type"] in _WORDS:
+        message = _WORDS[details["type"]].format(**details.get("ctx", {}))
+        if details["type"] == "missing":
+            location, value = [*location, str(details["loc"][-1])], ""
+    else:
+        message = details["msg"].removeprefix("Value error, ")
+        message = re.sub("^[A-Z][a-z]+ should", "must", message)
+    return Problem(".".join(([prefix] if prefix else []) + location), value, message)
+
+
+def _is_short(details: ErrorDetails) -> bool:
+    """Whether an item of a list of fixed length is missing; of several, the last tells the length."""
+    return details["type"] == "missing" and isinstance(details["loc"][-1], int)
+
+
+def _location(keys: Sequence[int | str], table: Any) -> list[str]:
+    """The keys that are in the file; pydantic puts the names of union members between them."""
+    found = []
+    for key in keys:
+        inside = isinstance(table, dict) and key in table
+        if inside or (isinstance(table, list) and isinstance(key, int) and key < len(table)):
+            table = table[key]
+            found.append(str(key))
+    return found
+
+
+def shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _valid_keys(model: type[BaseModel], location: list[str]) -> list[str]:
+    """Keys that may stand in the table at ``location``."""
+    if model is Frame and not location:
+        return [*Frame.model_fields, *FOLDERS]
+    current: Any = model
+    for key in location:
+        field = current.model_fields.get(key) if hasattr(current, "model_fields") else None
+        if field is None:
+            continue
+        annotation = field.annotation
+        arguments = getattr(annotation, "__args__", ())
+        current = next((a for a in arguments if hasattr(a, "model_fields")), annotation)
+    keys = list(getattr(current, "model_fields", {}))
+    return keys + (["kind"] if isinstance(current, type) and issubclass(current, Part) else [])

@@ -1,0 +1,68 @@
+"""Criteria of a mission: which flights pass, and what is said of those that do not."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import colift
+from colift import metrics
+from colift.errors import MissionError
+from colift.mission import load_mission
+
+SHORT = {"timing.duration": 0.3}
+
+
+def judged(criteria):
+    run = colift.run("hover", overrides={**SHORT, "criteria": criteria})
+    return metrics.judge(run.recording, run.metrics)
+
+
+def test_a_mission_without_criteria_is_not_judged():
+    assert judged({}) == []
+
+
+def test_each_criterion_gets_its_verdict():
+    found = judged(
+        {
+            "tracking_max_m": {"max": 0.05},
+            "min_angle_deg": {"min": 20.0, "max": 89.0},
+            "peak_tension_N": {"max": 0.01},
+            "tension_integral_10s_Ns": {"max": 1e9},  # not a number in a flight of 0.3 s
+        }
+    )
+    assert [each.metric for each in found[:2]] == ["outcome", "tracking_max_m"]
+    assert [each.holds for each in found] == [True, True, True, False, False]
+    assert found[2].bound == ">= 20 and <= 89"
+
+
+@pytest.mark.parametrize(
+    ("criteria", "message"),
+    [
+        (
+            {"traking_max_m": {"max": 1.0}},
+            r"criteria\.traking_max_m.*did you mean 'tracking_max_m'",
+        ),
+        ({"tracking_max_m": {}}, r"criteria\.tracking_max_m: must give min, max or both"),
+        ({"min_angle_deg": {"min": 2.0, "max": 1.0}}, r"criteria\.min_angle_deg\.min: .*max = 1"),
+        ({"min_angle_deg": 3.0}, r"criteria\.min_angle_deg: must be a table"),
+    ],
+)
+def test_mistakes_are_told_before_the_flight(criteria, message):
+    with pytest.raises(MissionError, match=message):
+        load_mission("hover", {"criteria": criteria})
+
+
+@pytest.mark.parametrize(("limit", "code"), [(0.5, 0), (1e-9, 4)])
+def test_the_command_ends_with_the_verdict(tmp_path, limit, code):
+    command = [sys.executable, "-m", "colift", "run", "hover", "--no-report", "--json"]
+    sets = ["--set", "timing.duration=0.3", "--set", f"criteria.tracking_max_m.max={limit}"]
+    done = subprocess.run(
+        [*command, *sets, "--out", str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    criteria = json.loads(done.stdout)["criteria"]
+    assert [each["holds"] for each in criteria] == [True, code == 0]
