@@ -8,6 +8,7 @@ whose limit is off. Integrated by MuJoCo's Runge-Kutta method of order four.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
@@ -88,7 +89,8 @@ def _step(  # type: ignore[no-untyped-def]
     if not all(np.abs(a).max() < mujoco.mjMAXVAL for a in (thrusts, torques, external, state)):
         state[:] = np.nan  # MuJoCo would go on with other numbers; a flight that diverges shall end
         return
-    substeps = int(params[-1])
+    # MuJoCo would soften, without a word, a limit that its step cannot follow.
+    substeps = max(int(params[-1]), math.ceil(2.0 * dt / params[-SETTINGS] - 1e-9))
     model.opt.timestep = dt / substeps
     model.tendon_limited[:] = attached > 0.0
     data.qpos[:] = state[scene.qpos]
@@ -121,13 +123,13 @@ class Mujoco(BodiesPart):
     needs = ("mujoco", "mujoco")
 
     time_constant: Annotated[float, Field(ge=1e-4, le=1.0)] = 0.002
-    """In which an error of a cable's length decays, s; at least two substeps."""
+    """In which an error of a cable's length decays, s."""
     damping_ratio: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
     """Of that decay."""
     impedance: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.999
     """Share of the acceleration that a constraint would need to be exact; nearer to 1 is stiffer."""
     substeps: Annotated[int, Field(ge=1, le=100)] = 1
-    """MuJoCo's steps per physics step."""
+    """MuJoCo's steps per physics step; more where the time constant would be less than two of them."""
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         softness = (1.0 - self.impedance) * (self.time_constant * self.damping_ratio) ** 2
