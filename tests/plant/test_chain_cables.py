@@ -201,6 +201,19 @@ def test_cables_too_stiff_for_any_sane_step_are_refused_with_what_would_do(setti
         colift.load_mission("hover", {**settings, "plant.stiffness": 1.1 * allowed})
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"events": [{"at": 1.0, "field": "load.mass", "value": 1e-9}]},
+        {"truth.load_mass_factor": 1e-4, "load.mass": 1e-4, "allocation.kind": "ring"},
+    ],
+)
+def test_the_masses_of_the_truth_and_of_events_count(change):
+    settings = {"plant.kind": "elastic-cables", "plant.stiffness": 1e6}
+    with pytest.raises(MissionError, match=r"plant\.stiffness.*at most"):
+        colift.load_mission("hover", {**settings, **change})
+
+
 def test_a_flight_that_needs_many_substeps_does_not_diverge():
     flown = colift.run(
         "hover", overrides={"plant.kind": "elastic-cables", "plant.stiffness": 1e8},
