@@ -13,7 +13,7 @@ from colift.part import find
 SERIES = (
     ("elastic-cables", "stiffness", (1e4, 1e5, 1e6, 1e7), {"damping_ratio": 0.1}),
     ("bead-cables", "beads", (1, 3, 7, 15), {}),
-    ("bead-cables", "density", (5e-3, 5e-4, 5e-5), {"drag_coefficient": 0.0, "damping_ratio": 0.1}),
+    ("bead-cables", "density", (1e-3, 2e-4, 5e-5), {"drag_coefficient": 0.0, "damping_ratio": 0.1}),
     ("mujoco", "time_constant", (0.04, 0.02, 0.01, 0.005), {"impedance": 0.9}),
 )
 
