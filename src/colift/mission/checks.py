@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -49,12 +50,13 @@ def cross_checks(
             )
     yield from _event_checks(frame, parts, broken)
     yield from _criteria_checks(frame)
-    if not broken & {"world", "load", "drones"}:
+    if not broken & {"world", "load", "drones", "truth"}:
         for path, part in _with_paths(parts, lists):
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
-            for field, message in part.check(frame.team):
+            team = frame.true_team if part.layer == "plant" else frame.team
+            for field, message in part.check(team):
                 yield Problem(f"{path}.{field}", "", message)
     if len(lists["disturbance"]) > MAX_DISTURBANCES:
         message = f"must be at most {MAX_DISTURBANCES}"
@@ -104,7 +106,14 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             if "drones" not in broken:
                 yield from _team_change(f"events.{i}.value", name, event.value, left, n)
         elif section == "load":
-            yield from _setting_change(f"events.{i}", frame.load, section, name, event.value)
+            found = list(_setting_change(f"events.{i}", frame.load, section, name, event.value))
+            yield from found
+            if not found and not broken & {"world", "load", "drones", "truth"}:
+                team = replace(frame.true_team, load_mass=float(event.value))
+                for field, message in present["plant"].check(team) if "plant" in present else ():
+                    yield Problem(
+                        f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
+                    )
         elif event.field == "allocation.kind":
             try:
                 present["allocation"] = find("allocation", str(event.value))()
