@@ -24,7 +24,8 @@ from numba import types
 from colift.allocation.base import INFO_SIZE, SIGNATURE, Allocator, AllocatorPart
 from colift.allocation.safe import Safe
 from colift.allocation.sqp import Sqp
-from colift.benchmark import machine, scaled_problem, smooth_forces
+from colift.benchmark.machine import machine
+from colift.benchmark.problems import forces, scaled_problem
 from colift.errors import ColiftError
 from colift.geometry import Array, ring
 from colift.jit import f8, i8, kernel, matrix, monotonic_ns, thread_time_ns, vector, void
@@ -95,10 +96,10 @@ def in_loop(part: AllocatorPart, team: Team, seconds: float, rate: float) -> Ite
     directions, tensions = ring(team.n, np.radians(35.0)), np.zeros(team.n)
     info, rest = np.zeros(INFO_SIZE), np.zeros(3)
     ticks = round(seconds * rate)
-    forces = smooth_forces(team.n, ticks)
+    path = forces(team.n, ticks, period=1.0 / rate)
     chunk = max(1, round(rate))
     for begin in range(0, ticks, chunk):
-        some = np.ascontiguousarray(forces[begin : begin + chunk])
+        some = np.ascontiguousarray(path[begin : begin + chunk])
         out = np.zeros((len(some), 4))
         _tick(
             type(part).kernel, some, 1.0 / rate, round(1e9 / rate), params, memory, tensions,
@@ -114,7 +115,7 @@ def from_python(
     allocator = Allocator(part, team, dt=1.0 / rate)
     period = round(1e9 / rate)
     ticks = round(seconds * rate)
-    forces = smooth_forces(team.n, ticks)
+    path = forces(team.n, ticks, period=1.0 / rate)
     collected = [0, 0]  # time in the collector so far, begin of the present collection
 
     def collector(phase: str, _: dict[str, int]) -> None:
@@ -140,7 +141,7 @@ def from_python(
                     cycle.append(cycle)
                 earlier = collected[0]
                 begin, cpu = time.perf_counter_ns(), time.thread_time_ns()
-                allocator.allocate(forces[first + k])
+                allocator.allocate(path[first + k])
                 used = time.thread_time_ns() - cpu
                 wall = time.perf_counter_ns() - begin
                 inside, outside = collected[0] - earlier, earlier - before
