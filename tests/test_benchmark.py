@@ -12,9 +12,10 @@ import pytest
 
 from colift import benchmark
 from colift.allocation.base import Allocator
-from colift.benchmark import problems, solvers, tables, timing
+from colift.benchmark import instructions, problems, solvers, tables, timing
 from colift.benchmark.problems import Problem
 from colift.benchmark.referee import TOLERANCES, judge
+from colift.errors import ColiftError
 
 SIZES = (2, 3, 4, 16)
 
@@ -237,3 +238,56 @@ def test_every_size_has_a_row_in_the_tables(quick) -> None:
         if "judged" not in title:
             assert [row[0] for row in rows] == ["2", "4"]
     assert any("Closed loop" in note for note in tables.notes(quick))
+
+
+def test_instructions_need_valgrind_and_its_kind_of_processor(monkeypatch) -> None:
+    monkeypatch.setattr(instructions.shutil, "which", lambda _: None)
+    monkeypatch.setattr(instructions.platform, "machine", lambda: "x86_64")
+    assert "apt install valgrind" in instructions.count([2])["reason"]
+    monkeypatch.setattr(instructions.platform, "machine", lambda: "arm64")
+    assert "arm64" in instructions.count([2])["reason"]
+
+
+@pytest.mark.skipif(bool(instructions.reason_against()), reason="needs valgrind")
+def test_instructions_are_those_of_the_calls() -> None:
+    counted = instructions.count([2, 4])
+    rows = {(r["problem"], r["family"], r["n"]): r["instructions"] for r in counted["rows"]}
+    assert len(rows) == 8
+    for problem in problems.NAMES:
+        for family in problems.FAMILIES:
+            assert 500 < rows[problem, family, 2] < rows[problem, family, 4] < 200_000
+        assert rows[problem, "smooth", 4] < rows[problem, "noisy", 4]  # fewer iterations
+    assert counted["target"] == "x86-64-v3"
+
+
+def test_a_dump_without_a_count_is_an_error(tmp_path) -> None:
+    dump = tmp_path / "dump.1"
+    dump.write_text("version: 1\ntotals: 4711\n")
+    assert instructions._total(dump) == 4711
+    dump.write_text("version: 1\n")
+    with pytest.raises(ColiftError, match=r"dump\.1"):
+        instructions._total(dump)
+
+
+def test_a_solver_that_grows_too_slow_is_left_out_with_the_reason() -> None:
+    forecast = benchmark._Forecast(benchmark.Effort(rounds=10, budget=1.0, first=10.0, flights=1))
+    entrant = solvers.Entrant("a", "python", lambda _: None)
+    racer = timing.Racer(entrant, None, Problem("paper", 4), first=0.1, block=1, place=0)
+    racer.cpu.append(np.full(5, 0.05))
+    assert forecast.reason(entrant, 4) == ""
+    forecast.note(racer)
+    assert forecast.reason(entrant, 6) == ""  # 3 calls of 0.05 * 1.5^3 s
+    assert forecast.reason(entrant, 8) == "about 0.8 s a call at n = 8"
+    assert forecast.reason(entrant, 16) == "about 0.8 s a call at n = 8"
+    absent = solvers.Entrant("b", "python", lambda _: None, "no_such_package.part")
+    assert forecast.reason(absent, 4) == "no_such_package is not installed"
+
+
+@pytest.mark.parametrize("sizes", ["1,4", "four", "2000"])
+def test_sizes_that_cannot_be_are_refused(sizes) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "colift", "bench", "--sizes", sizes],
+        capture_output=True, text=True, timeout=100, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "number" in done.stderr

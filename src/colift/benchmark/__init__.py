@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from colift.benchmark.instructions import LARGEST, count
 from colift.benchmark.machine import machine
 from colift.benchmark.problems import FAMILIES, NAMES, Family, Problem
 from colift.benchmark.referee import Verdict
@@ -220,6 +221,6 @@ def run(
         "closed_loop": closed_loop(effort.flights),
     }
     if instructions:
-        result["instructions"] = {}
+        result["instructions"] = count([n for n in sorted(set(sizes)) if n <= LARGEST])
     report(1.0)
     return result

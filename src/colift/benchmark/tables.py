@@ -34,6 +34,9 @@ def tables(result: dict[str, Any]) -> Iterator[Table]:
                 yield _own(f"{TITLES[problem]}, {family} force", some)
                 yield _all(f"{TITLES[problem]}, {family} force", some)
         yield _quality(TITLES[problem], [r for r in rows if r["problem"] == problem])
+    counted = result.get("instructions", {}).get("rows")
+    if counted:
+        yield _instructions(result["instructions"])
 
 
 def own(rows: list[dict[str, Any]], n: int, caller: str) -> dict[str, Any]:
@@ -121,6 +124,19 @@ def _quality(title: str, rows: list[dict[str, Any]]) -> Table:
     )
 
 
+def _instructions(counted: dict[str, Any]) -> Table:
+    found = {(r["problem"], r["family"], r["n"]): r["instructions"] for r in counted["rows"]}
+    kinds = [(problem, family) for problem in NAMES for family in FAMILIES]
+    return (
+        f"Instructions of a call, mean of {counted['calls']}, code for {counted['target']}",
+        ["n", *(f"{problem}, {family}" for problem, family in kinds)],
+        [
+            [str(n), *(f"{found[problem, family, n]:.0f}" for problem, family in kinds)]
+            for n in sorted({r["n"] for r in counted["rows"]})
+        ],
+    )
+
+
 def _largest(values: Iterable[float]) -> str:
     found = [value for value in values if math.isfinite(value)]
     if not found:
@@ -136,6 +152,8 @@ def notes(result: dict[str, Any]) -> Iterator[str]:
         reasons.setdefault((what, row["reason"]), []).append(row["n"])
     for (what, reason), left_out in reasons.items():
         yield f"Left out: {what}, from n = {min(left_out)} on: {reason}."
+    if reason := result.get("instructions", {}).get("reason"):
+        yield f"No instructions counted: {reason}."
     loop = result["closed_loop"]
     yield (
         f"Closed loop, paper-spiral, {loop['simulated_s']:g} s recorded: median {loop['median_s']:.3f} s "
