@@ -9,6 +9,7 @@ wall time is no test.
 
 from __future__ import annotations
 
+import json
 import os
 import statistics
 import subprocess
@@ -19,10 +20,9 @@ from pathlib import Path
 
 from rich.table import Table
 
-from colift import benchmark
 from colift.benchmark.problems import FAMILIES, NAMES
-from colift.benchmark.tables import own, ratio, tables
-from colift.cli.base import out, show_tables
+from colift.benchmark.tables import own, ratio
+from colift.cli.base import out
 
 
 def whole_process(arguments: list[str], cache: str | None = None) -> float:
@@ -37,8 +37,11 @@ def whole_process(arguments: list[str], cache: str | None = None) -> float:
 
 
 def main() -> None:
-    result = benchmark.run([4, 16, 64, 1024])
-    show_tables(tables(result))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench.json"
+        bench = ["bench", "--sizes", "4,16,64,1024", "--out", str(file)]
+        subprocess.run([sys.executable, "-m", "colift", *bench], check=True)
+        result = json.loads(file.read_text())
     rows = {
         (problem, family): [
             row for row in result["results"] if (row["problem"], row["family"]) == (problem, family)

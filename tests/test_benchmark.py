@@ -171,7 +171,7 @@ def test_solvers_take_turns_and_the_lead_changes(monkeypatch) -> None:
     turns = [name for name, _ in book[6:]]  # after two warm-up turns each
     assert "".join(turns) == "abcbcacababc"
     assert not late
-    assert {racer.place for racer in racers} == {21 + 4 * racers[0].block}
+    assert {racer.place for racer in racers} == {22 + 4 * racers[0].block}
     assert all(racer.calls == 4 * racer.block for racer in racers)  # warm-up does not count
 
 
@@ -276,9 +276,9 @@ def test_a_solver_that_grows_too_slow_is_left_out_with_the_reason() -> None:
     racer.cpu.append(np.full(5, 0.05))
     assert forecast.reason(entrant, 4) == ""
     forecast.note(racer)
-    assert forecast.reason(entrant, 6) == ""  # 3 calls of 0.05 * 1.5^3 s
-    assert forecast.reason(entrant, 8) == "about 0.8 s a call at n = 8"
-    assert forecast.reason(entrant, 16) == "about 0.8 s a call at n = 8"
+    assert forecast.reason(entrant, 8) == ""  # 3 calls of 0.05 * 2^2 s
+    assert forecast.reason(entrant, 16) == "about 0.8 s a call at n = 16"
+    assert forecast.reason(entrant, 32) == "about 0.8 s a call at n = 16"
     absent = solvers.Entrant("b", "python", lambda _: None, "no_such_package.part")
     assert forecast.reason(absent, 4) == "no_such_package is not installed"
 

@@ -123,12 +123,16 @@ def page(result, late):
     parts.append(
         "\n".join(f"- {note}" for note in notes(result) if "Left out" in note or "No " in note)
     )
-    parts.append(LATENCY.format(machine=machine(late), **late))
+    parts.append(LATENCY.format(**late | {"machine": machine(late)}))
     parts += [markdown(table) for table in latency.tables(late)]
     return "\n".join(parts)
 
 
-PAGE = """# Speed, and what the answers are worth
+PAGE = """---
+orphan: true
+---
+
+# Speed, and what the answers are worth
 
 Written by `python docs/figures/performance.py` from `docs/figures/performance.json` and
 `docs/figures/latency.json`. To measure anew, about twelve minutes on a quiet machine:
@@ -171,8 +175,8 @@ work shows in p99 and worst; processor time and instructions are what to compare
 **Referee.** Every answer that is judged is judged from tensions and directions alone: error of the *force*
 balance over the force; *unit* length; *KKT* residual with the best multipliers of the right sign; shortfall of the least
 *angle* and excess over the *cone*, degrees; excess over the bounds of *tensions*, in mean tensions. *wrong* counts
-answers with a fault that their solver called solved. *excess* is the cost above the best faultless answer to the
-same force, relative to the closed-form optimum.
+answers with a fault that their solver called solved. *cost* is how far the cost lies above the best faultless answer
+to the same force, relative to the closed-form optimum: the median, of the worst n.
 
 `safe` is not at rest at the optimum of each instant: it settles there within 0.3 s and keeps a barrier to the limits, so its KKT
 residual is not small. It may give up part of a force that its limits do not allow, and says so; those answers

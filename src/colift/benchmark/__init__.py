@@ -8,7 +8,6 @@ turns on a clock (:mod:`~colift.benchmark.timing`), what the answers are worth
 from __future__ import annotations
 
 import math
-import os
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -21,7 +20,7 @@ from colift.benchmark.instructions import LARGEST, count
 from colift.benchmark.machine import machine
 from colift.benchmark.problems import FAMILIES, NAMES, Family, Problem
 from colift.benchmark.referee import Verdict
-from colift.benchmark.solvers import BLAS_THREADS, ENTRANTS, Entrant
+from colift.benchmark.solvers import ENTRANTS, Entrant
 from colift.benchmark.timing import FEWEST, Racer, race
 from colift.runner import run as fly
 
@@ -51,7 +50,7 @@ class Effort(NamedTuple):
     flights: int
 
 
-FULL, QUICK = Effort(100, 1.5, 10.0, 9), Effort(10, 0.1, 1.0, 3)
+FULL, QUICK = Effort(100, 1.5, 10.0, 9), Effort(10, 0.2, 1.0, 3)
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ def measurements(
 
 
 class _Forecast:
-    """Who can still be asked at the next size, if the time of a call grows with the cube of n."""
+    """Who can still be asked at the next size, if the time of a call grows with the square of n."""
 
     def __init__(self, effort: Effort) -> None:
         self._effort = effort
@@ -135,9 +134,11 @@ class _Forecast:
         if entrant in self._out:
             return self._out[entrant]
         before, call, first = self._seen.get(entrant, (n, 0.0, 0.0))
-        growth = (n / before) ** 3
-        if FEWEST * growth * call > self._effort.budget or growth * first > self._effort.first:
-            return self.stop(entrant, f"about {growth * max(call, first):.2g} s a call at n = {n}")
+        growth = (n / before) ** 2
+        if FEWEST * growth * call > self._effort.budget:
+            return self.stop(entrant, f"about {growth * call:.2g} s a call at n = {n}")
+        if growth * first > self._effort.first:
+            return self.stop(entrant, f"about {growth * first:.2g} s to get going at n = {n}")
         return ""
 
     def stop(self, entrant: Entrant, reason: str) -> str:
@@ -187,8 +188,6 @@ def run(
         Called with the fraction that is done.
 
     """
-    for name in BLAS_THREADS:  # read when SciPy loads its library, so set before its import
-        os.environ.setdefault(name, "1")
     report: Progress = progress or (lambda _: None)
     rows: list[Measurement] = []
     skipped: list[dict[str, Any]] = []

@@ -1,8 +1,8 @@
 """Who takes part: colift's allocators, published ones and general solvers, each called in its own way.
 
 Only the solver's own call is timed. General solvers get the same forces, analytic derivatives, their own
-last answer (and multipliers, where they take them) as a start, and one BLAS thread: on matrices so small,
-more threads only wait for each other.
+last answer (and multipliers, where they take them) as a start, and one BLAS thread where the program sees to
+it in time (:func:`colift.threads.one_blas_thread`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,6 @@ from colift.allocation.base import Allocator, AllocatorPart
 from colift.benchmark.problems import Name, Problem
 from colift.geometry import Array
 from colift.part import find
-
-BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Environment variables that limit the threads of the BLAS libraries that SciPy is built with."""
 
 TOLERANCE = 1e-5
 """Asked of general solvers; SLSQP's ``ftol`` is its square."""

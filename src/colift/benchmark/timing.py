@@ -27,8 +27,10 @@ SLOT = 1e-3
 """A fast solver's turn is made this long, s, or long enough to spend its budget if that is less."""
 COLD = 0.1
 """Share of a turn's calls that are not timed: another solver has just used the caches."""
-JUDGED_A_TURN = 10
-"""Most answers of one turn that the referee looks at."""
+JUDGED_A_TURN, JUDGED_CABLES = 10, 160
+"""Most answers of one turn that the referee looks at, and most cables in them together."""
+COLD_STARTS = 2
+"""First calls, in which a solver builds itself: IPOPT once for a cold and once for a warm start."""
 FEWEST = 3
 """Calls for which a solver's budget must suffice."""
 
@@ -175,7 +177,8 @@ class Racer:
         self.calls += len(forces)
         self.iterations += float(done.iterations.sum())
         self.unsolved += int(np.count_nonzero(~done.solved))
-        for k in range(min(len(forces), JUDGED_A_TURN)):
+        seen = min(JUDGED_A_TURN, max(1, JUDGED_CABLES // self.n))
+        for k in range(min(len(forces), seen)):
             place = self.place + k
             verdict = judge(self.problem, forces[k], done.tensions[k], done.directions[k])
             self.verdicts[place] = verdict
@@ -209,11 +212,11 @@ def enter(
 ) -> Racer | Skipped:
     """Warm an entrant up on the first forces, and measure how many calls make up its turn."""
     ready = runner(entrant, problem)
-    begin = time.perf_counter()
-    ready.turn(path[:1])
-    first = time.perf_counter() - begin
-    warm = 1 + (1 if first > 0.1 * budget else 20)
-    typical = float(np.median(ready.turn(path[1:warm]).wall))
+    begin = time.thread_time()
+    ready.turn(path[:COLD_STARTS])
+    first = time.thread_time() - begin
+    warm = COLD_STARTS + (1 if first > 0.1 * budget else 20)
+    typical = float(np.median(ready.turn(path[COLD_STARTS:warm]).cpu))
     if FEWEST * typical > budget:
         return Skipped(entrant, f"one call takes {typical:.2g} s")
     block = int(min(SLOT, budget / rounds) / typical)
@@ -228,7 +231,7 @@ def race(
 
     One whose budget (s) is spent leaves the race; one for which it does not suffice is named.
     """
-    path = problem.forces(21 + rounds * LONGEST_TURN, family)
+    path = problem.forces(COLD_STARTS + 20 + rounds * LONGEST_TURN, family)
     found = [enter(entrant, problem, path, budget, rounds) for entrant in entrants]
     racers = [one for one in found if isinstance(one, Racer)]
     with _no_collector():

@@ -18,6 +18,7 @@ from colift.cli.base import (
     save_json,
     show_tables,
 )
+from colift.threads import one_blas_thread
 
 
 @app.command()
@@ -41,6 +42,7 @@ def bench(
     warm-up is excluded. One referee looks at the answers alone, so that a fast wrong answer shows.
     """
     counts = None if sizes is None else numbers(sizes, 2, 1024)
+    one_blas_thread()
     with loading():
         from colift import benchmark
         from colift.benchmark.tables import notes, tables
