@@ -231,6 +231,14 @@ def test_our_answers_are_right_and_nobody_finds_better_ones(quick) -> None:
             assert set(row["faults"]) <= {"unbalanced"}  # told by the status
 
 
+def test_a_measure_that_was_not_taken_is_a_dash_in_the_tables(quick) -> None:
+    row = {**quick["results"][0], "excess": None}
+    row["worst"] = {**row["worst"], "stationarity": None}
+    title, header, rows = list(tables.tables({"results": [row, {**row, "caller": "python"}]}))[2]
+    assert "judged" in title
+    assert [rows[0][header.index(name)] for name in ("KKT", "cost")] == ["-", "-"]
+
+
 def test_every_size_has_a_row_in_the_tables(quick) -> None:
     found = {title: rows for title, _, rows in tables.tables(quick)}
     assert len(found) == 10
@@ -279,6 +287,10 @@ def test_a_solver_that_grows_too_slow_is_left_out_with_the_reason() -> None:
     assert forecast.reason(entrant, 8) == ""  # 3 calls of 0.05 * 2^2 s
     assert forecast.reason(entrant, 16) == "about 0.8 s a call at n = 16"
     assert forecast.reason(entrant, 32) == "about 0.8 s a call at n = 16"
+    builder = solvers.Entrant("c", "python", lambda _: None)
+    racer.entrant, racer.first = builder, 2.0
+    forecast.note(racer)
+    assert forecast.reason(builder, 8) == "about 16 s to get going at n = 8"
     absent = solvers.Entrant("b", "python", lambda _: None, "no_such_package.part")
     assert forecast.reason(absent, 4) == "no_such_package is not installed"
 

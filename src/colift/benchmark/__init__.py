@@ -120,7 +120,7 @@ def measurements(
 
 
 class _Forecast:
-    """Who can still be asked at the next size, if the time of a call grows with the square of n."""
+    """Who can still be asked at the next size: a call grows with the square of n, a first call with its cube."""
 
     def __init__(self, effort: Effort) -> None:
         self._effort = effort
@@ -134,11 +134,11 @@ class _Forecast:
         if entrant in self._out:
             return self._out[entrant]
         before, call, first = self._seen.get(entrant, (n, 0.0, 0.0))
-        growth = (n / before) ** 2
-        if FEWEST * growth * call > self._effort.budget:
-            return self.stop(entrant, f"about {growth * call:.2g} s a call at n = {n}")
-        if growth * first > self._effort.first:
-            return self.stop(entrant, f"about {growth * first:.2g} s to get going at n = {n}")
+        call, first = call * (n / before) ** 2, first * (n / before) ** 3
+        if FEWEST * call > self._effort.budget:
+            return self.stop(entrant, f"about {call:.2g} s a call at n = {n}")
+        if first > self._effort.first:
+            return self.stop(entrant, f"about {first:.2g} s to get going at n = {n}")
         return ""
 
     def stop(self, entrant: Entrant, reason: str) -> str:

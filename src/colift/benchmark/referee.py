@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colift.allocation._sqp_newton import optimal_objective
 from colift.benchmark.problems import Problem
@@ -154,21 +155,28 @@ def _stationarity(
 
     cost_slope = slopes(T[None], 2.0 * mu * (alpha @ (alpha.T @ alpha))[None])[0]
     balance = slopes(alpha.T, np.einsum("i,ka->kia", T, np.eye(3)))
-    each = np.eye(n)
-    none = np.zeros((n, n, 3))
+
+    def at(cables: NDArray[np.intp]) -> Array:
+        """One row (n,) a cable, with 1 in its place."""
+        rows = np.zeros((len(cables), n))
+        rows[np.arange(len(cables)), cables] = 1.0
+        return rows
+
+    least = at(np.flatnonzero(n * (T - low) < AT_WORK))
+    most = at(np.flatnonzero(n * (high - T) < AT_WORK))
     at_work = [
-        slopes(each, none)[n * (T - low) < AT_WORK],
-        slopes(-each, none)[n * (high - T) < AT_WORK],
+        slopes(least, np.zeros((*least.shape, 3))),
+        slopes(-most, np.zeros((*most.shape, 3))),
     ]
     if limits.cone:
-        down = np.einsum("ki,a->kia", -each, [0.0, 0.0, 1.0])
-        at_work.append(slopes(0.0 * each, down)[limits.height_max - alpha[:, 2] < AT_WORK])
+        rim = at(np.flatnonzero(limits.height_max - alpha[:, 2] < AT_WORK))
+        at_work.append(slopes(0.0 * rim, np.einsum("ki,a->kia", -rim, [0.0, 0.0, 1.0])))
     if limits.pairs:
         i, j = np.triu_indices(n, k=1)
         close = limits.cosine_max - np.sum(alpha[i] * alpha[j], axis=1) < AT_WORK
         i, j = i[close], j[close]
-        apart = -np.einsum("ki,ka->kia", each[i], alpha[j])
-        apart -= np.einsum("ki,ka->kia", each[j], alpha[i])
+        apart = -np.einsum("ki,ka->kia", at(i), alpha[j])
+        apart -= np.einsum("ki,ka->kia", at(j), alpha[i])
         at_work.append(slopes(np.zeros((len(i), n)), apart))
     pushing = np.vstack(at_work)
     while True:

@@ -141,8 +141,9 @@ def _instructions(counted: dict[str, Any]) -> Table:
     )
 
 
-def _largest(values: Iterable[float]) -> str:
-    found = [value for value in values if math.isfinite(value)]
+def _largest(values: Iterable[float | None]) -> str:
+    """The largest that is a number; JSON has null for what was not measured."""
+    found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return "-"
     return f"{max(found):.0e}" if max(found) > 0.0 else "0"
