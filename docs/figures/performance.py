@@ -128,11 +128,7 @@ def page(result, late):
     return "\n".join(parts)
 
 
-PAGE = """---
-orphan: true
----
-
-# Speed, and what the answers are worth
+PAGE = """# Speed, and what the answers are worth
 
 Written by `python docs/figures/performance.py` from `docs/figures/performance.json` and
 `docs/figures/latency.json`. To measure anew, about twelve minutes on a quiet machine:
