@@ -1,0 +1,88 @@
+// Views: orbit freely, follow the load, look from the top or the side. Views of several flights move as one.
+
+import { type Box3, MOUSE, type PerspectiveCamera, Vector3 } from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+
+export const VIEWS = ["orbit", "follow", "top", "side"] as const;
+export type View = (typeof VIEWS)[number];
+
+const TOWARDS: Record<View, [number, number, number]> = {
+  orbit: [0.75, -1, 0.55],
+  follow: [0.75, -1, 0.45],
+  top: [0, -0.001, 1],
+  side: [0, -1, 0.03],
+};
+
+export class Rig {
+  view: View = "orbit";
+  private readonly controls: OrbitControls;
+  private readonly centre = new Vector3();
+  private readonly load = new Vector3();
+  private readonly radius: number;
+  private readonly listeners: (() => void)[] = [];
+
+  constructor(
+    readonly camera: PerspectiveCamera,
+    canvas: HTMLCanvasElement,
+    box: Box3,
+  ) {
+    this.controls = new OrbitControls(camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.mouseButtons = { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
+    this.controls.minDistance = 0.3;
+    this.controls.maxDistance = 60;
+    box.getCenter(this.centre);
+    this.radius = Math.max(0.5 * box.getSize(new Vector3()).length(), 0.8);
+    this.load.copy(this.centre);
+    this.controls.addEventListener("change", () => this.listeners.forEach((listener) => listener()));
+    this.set("orbit");
+  }
+
+  onMove(listener: () => void): void {
+    this.listeners.push(listener);
+  }
+
+  set enabled(on: boolean) {
+    this.controls.enabled = on;
+  }
+
+  set(view: View): void {
+    this.view = view;
+    const target = view === "follow" ? this.load : this.centre;
+    const radius = view === "follow" ? Math.min(this.radius, 1.5) : this.radius;
+    const half = (this.camera.fov * Math.PI) / 360;
+    const fit = radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
+    this.controls.target.copy(target);
+    this.camera.position.set(...TOWARDS[view]).setLength(0.74 * fit).add(target);
+    this.controls.update();
+  }
+
+  follow(load: ArrayLike<number>): void {
+    const [x, y, z] = [load[0]!, load[1]!, load[2]!];
+    if (!Number.isFinite(x + y + z)) return;
+    const before = this.load.clone();
+    this.load.set(x, y, z);
+    if (this.view !== "follow") return;
+    const moved = before.negate().add(this.load);
+    this.controls.target.add(moved);
+    this.camera.position.add(moved);
+    this.controls.update();
+  }
+
+  resize(aspect: number): void {
+    const first = this.camera.aspect === 1 || aspect < 1 !== this.camera.aspect < 1;
+    this.camera.aspect = aspect;
+    this.camera.updateProjectionMatrix();
+    if (first) this.set(this.view);
+  }
+
+  /** Look as another one looks; each keeps its own load when following. */
+  match(other: Rig): void {
+    this.view = other.view;
+    const follows = this.view === "follow";
+    const offset = follows ? this.load.clone().sub(other.load) : new Vector3();
+    this.controls.target.copy(other.controls.target).add(offset);
+    this.camera.position.copy(other.camera.position).add(offset);
+    this.camera.lookAt(this.controls.target);
+  }
+}

@@ -1,0 +1,300 @@
+// Plots over time. To add one, add an entry to PLOTS; it is drawn, synchronised and read on hover.
+
+import uPlot from "uplot";
+import type { Clock } from "./clock";
+import type { Flight } from "./data";
+import { el, format } from "./dom";
+import { theme } from "./theme";
+
+interface Line {
+  label: string;
+  colour: string;
+  dash: number[];
+  width: number;
+  values: (row: number) => number;
+}
+
+interface Plot {
+  title: string;
+  unit: string;
+  digits: number;
+  /** Lines of the only flight. */
+  lines: (flight: Flight) => Line[];
+  /** The one line that stands for a flight beside others. */
+  summary: (flight: Flight) => (row: number) => number;
+  summaryTitle: string;
+  /** A level not to fall below, drawn across. */
+  limit?: (flight: Flight) => number;
+}
+
+/** Above so many drones only a summary is drawn. */
+const MANY = 12;
+
+const perDrone = (flight: Flight, name: "tensions" | "thrusts"): Line[] =>
+  Array.from({ length: flight.n }, (_, i) => ({
+    label: `${i + 1}`,
+    ...theme.drone(i),
+    width: 1.6,
+    values: (row: number) => flight.columns[name].at(row, i),
+  }));
+
+const over = (flight: Flight, name: "tensions", pick: (...values: number[]) => number) => (row: number) => {
+  const found: number[] = [];
+  for (let i = 0; i < flight.n; i++) {
+    const value = flight.columns[name].at(row, i);
+    if (Number.isFinite(value)) found.push(value);
+  }
+  return found.length ? pick(...found) : NaN;
+};
+
+const single = (label: string, values: (row: number) => number): Line => ({
+  label,
+  colour: theme.palette.ink,
+  dash: [],
+  width: 1.8,
+  values,
+});
+
+const axis = (flight: Flight, k: number) => (row: number) =>
+  100 * (flight.columns.load.at(row, k) - flight.columns.reference.at(row, k));
+
+export const PLOTS: Plot[] = [
+  {
+    title: "Tension",
+    unit: "N",
+    digits: 3,
+    lines: (flight) =>
+      flight.n <= MANY
+        ? perDrone(flight, "tensions")
+        : [single("largest", over(flight, "tensions", Math.max)), single("smallest", over(flight, "tensions", Math.min))],
+    summary: (flight) => over(flight, "tensions", Math.max),
+    summaryTitle: "Largest tension",
+  },
+  {
+    title: "Smallest angle between cables",
+    unit: "\u00b0",
+    digits: 1,
+    lines: (flight) => [single("angle", (row) => flight.columns.angle.at(row))],
+    summary: (flight) => (row) => flight.columns.angle.at(row),
+    summaryTitle: "Smallest angle between cables",
+    limit: (flight) => flight.info.safe_angle_deg,
+  },
+  {
+    title: "Distance from reference",
+    unit: "cm",
+    digits: 2,
+    lines: (flight) => [
+      single("distance", (row) => 100 * flight.columns.error.at(row)),
+      ...["x", "y", "z"].map((label, k) => ({ label, ...theme.drone(k), width: 1.1, values: axis(flight, k) })),
+    ],
+    summary: (flight) => (row) => 100 * flight.columns.error.at(row),
+    summaryTitle: "Distance from reference",
+  },
+  {
+    title: "Solve time",
+    unit: "\u00b5s",
+    digits: 1,
+    lines: (flight) => [single("longest", (row) => 1e6 * flight.columns.solve_time.at(row))],
+    summary: (flight) => (row) => 1e6 * flight.columns.solve_time.at(row),
+    summaryTitle: "Solve time",
+  },
+];
+
+const FONT = "11px system-ui, sans-serif";
+
+/** One plot: a head with name and values at the cursor, and the curves. */
+class Chart {
+  readonly element = el("figure", { class: "plot" });
+  private readonly host = el("div", { class: "curves" });
+  private readonly head = el("figcaption");
+  private chart: uPlot | null = null;
+  private lines: Line[] = [];
+  private values: HTMLElement[] = [];
+  private version = "";
+  private hovered: number | null = null;
+
+  constructor(
+    private readonly plot: Plot,
+    private readonly flights: Flight[],
+    private readonly clock: Clock,
+    private readonly sync: uPlot.SyncPubSub,
+    private readonly window: number,
+  ) {
+    this.element.append(this.head, this.host);
+    new ResizeObserver(() => this.resize()).observe(this.host);
+    theme.onChange(() => this.build());
+  }
+
+  /** Follow the clock, and the rows where they have grown. */
+  update(): void {
+    if (!this.chart) return;
+    const { start, end } = this.clock;
+    const version = `${start} ${end} ${this.flights.map((flight) => flight.version).join()}`;
+    if (version !== this.version) {
+      this.version = version;
+      this.chart.setData(this.data(), false);
+      this.chart.setScale("x", { min: Math.max(start, end - this.window), max: Math.max(end, start + 1e-3) });
+    } else this.chart.redraw(false);
+    this.read();
+  }
+
+  private data(): uPlot.AlignedData {
+    const first = this.flights[0]!;
+    const x = Array.from({ length: first.rows }, (_, row) => first.time.at(row));
+    if (this.flights.length === 1)
+      return [x, ...this.lines.map((line) => x.map((_, row) => gap(line.values(row))))];
+    const tables = this.flights.map((flight, k): uPlot.AlignedData => {
+      const t = Array.from({ length: flight.rows }, (_, row) => flight.time.at(row));
+      return [t, t.map((_, row) => gap(this.lines[k]!.values(row)))];
+    });
+    return uPlot.join(tables, tables.map(() => [1, 2]));
+  }
+
+  private build(): void {
+    const { palette } = theme;
+    const several = this.flights.length > 1;
+    this.lines = several
+      ? this.flights.map((flight, k) => ({
+          label: flight.info.label,
+          colour: palette.flights[k]!,
+          dash: [[], [7, 3], [2, 2]][k]!,
+          width: 1.8,
+          values: this.plot.summary(flight),
+        }))
+      : this.plot.lines(this.flights[0]!);
+    this.chart?.destroy();
+    const grid = { stroke: palette.ground, width: 1 };
+    const ticks = { show: false };
+    this.chart = new uPlot(
+      {
+        width: Math.max(this.host.clientWidth, 200),
+        height: Math.max(this.host.clientHeight, 60),
+        pxAlign: false,
+        legend: { show: false },
+        cursor: {
+          sync: { key: this.sync.key },
+          y: false,
+          points: { size: 5 },
+          drag: { x: false, y: false },
+          bind: {
+            mousedown: (chart, _target, handler) => (event) => {
+              handler(event);
+              if (event.button === 0) this.clock.seek(chart.posToVal(chart.cursor.left!, "x"));
+              return null;
+            },
+          },
+        },
+        scales: { x: { time: false }, y: { range: (_chart, low, high) => room(low, high, this.plot.limit?.(this.flights[0]!)) } },
+        axes: [
+          { stroke: palette.soft, grid, ticks, font: FONT, size: 22, gap: 4, values: (_chart, splits) => splits.map((t) => `${t}`) },
+          { stroke: palette.soft, grid, ticks, font: FONT, size: 42, gap: 6, space: 28 },
+        ],
+        series: [
+          {},
+          ...this.lines.map(
+            (line): uPlot.Series => ({
+              label: line.label,
+              stroke: line.colour,
+              width: line.width,
+              dash: line.dash,
+              points: { show: false },
+              spanGaps: several,
+            }),
+          ),
+        ],
+        hooks: {
+          draw: [(chart) => this.overlay(chart)],
+          setCursor: [
+            (chart) => {
+              this.hovered = chart.cursor.left! >= 0 ? chart.posToVal(chart.cursor.left!, "x") : null;
+              this.read();
+            },
+          ],
+        },
+      },
+      this.data(),
+      this.host,
+    );
+    this.sync.sub(this.chart);
+    this.version = "";
+    this.header();
+    this.update();
+  }
+
+  /** The limit, and where the clock stands. */
+  private overlay(chart: uPlot): void {
+    const { ctx, bbox } = chart;
+    const { palette } = theme;
+    const rule = (x0: number, y0: number, x1: number, y1: number, colour: string, dash: number[]): void => {
+      ctx.save();
+      ctx.strokeStyle = colour;
+      ctx.lineWidth = 1.4 * devicePixelRatio;
+      ctx.setLineDash(dash.map((length) => length * devicePixelRatio));
+      ctx.beginPath();
+      ctx.moveTo(x0, y0);
+      ctx.lineTo(x1, y1);
+      ctx.stroke();
+      ctx.restore();
+    };
+    const limit = this.plot.limit?.(this.flights[0]!);
+    if (limit !== undefined) {
+      const y = chart.valToPos(limit, "y", true);
+      if (y > bbox.top && y < bbox.top + bbox.height) rule(bbox.left, y, bbox.left + bbox.width, y, palette.warn, [5, 4]);
+    }
+    const x = chart.valToPos(this.clock.time, "x", true);
+    if (x >= bbox.left - 1 && x <= bbox.left + bbox.width + 1) rule(x, bbox.top, x, bbox.top + bbox.height, palette.ink, []);
+  }
+
+  private header(): void {
+    const several = this.flights.length > 1;
+    this.values = this.lines.map(() => el("b"));
+    const keys = this.lines.map((line, k) => {
+      const swatch = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+      swatch.setAttribute("viewBox", "0 0 22 6");
+      swatch.setAttribute("class", "swatch");
+      const stroke = document.createElementNS("http://www.w3.org/2000/svg", "line");
+      for (const [name, value] of Object.entries({ x1: "0", y1: "3", x2: "22", y2: "3", stroke: line.colour, "stroke-width": "2", "stroke-dasharray": line.dash.join(" ") || "none" }))
+        stroke.setAttribute(name, value);
+      swatch.append(stroke);
+      return el("span", { class: "key" }, swatch, el("span", {}, line.label), this.values[k]!);
+    });
+    this.head.replaceChildren(
+      el("span", { class: "name" }, several ? this.plot.summaryTitle : this.plot.title, el("i", {}, ` ${this.plot.unit}`)),
+      el("span", { class: "keys" }, ...keys),
+    );
+  }
+
+  /** Values where the mouse is, else where the clock is. */
+  private read(): void {
+    const time = this.hovered ?? this.clock.time;
+    this.lines.forEach((line, k) => {
+      const flight = this.flights[this.flights.length > 1 ? k : 0]!;
+      const value = flight.rows ? line.values(flight.rowAt(time + 1e-9)) : NaN;
+      this.values[k]!.textContent = format(value, this.plot.digits);
+    });
+    this.element.classList.toggle("hovered", this.hovered !== null);
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.host;
+    if (clientWidth > 40 && clientHeight > 40) this.chart?.setSize({ width: clientWidth, height: clientHeight });
+  }
+}
+
+/** All plots; `window` is the length of the past that live plots show, s. */
+export function plots(flights: Flight[], clock: Clock, window = Infinity): { element: HTMLElement; update: () => void } {
+  const sync = uPlot.sync("colift");
+  const charts = PLOTS.map((plot) => new Chart(plot, flights, clock, sync, window));
+  const element = el("div", { class: "plots" }, ...charts.map((chart) => chart.element));
+  return { element, update: () => charts.forEach((chart) => chart.update()) };
+}
+
+const gap = (value: number): number | null => (Number.isFinite(value) ? value : null);
+
+/** A range with room above and below that shows the limit. */
+function room(low: number | null, high: number | null, limit?: number): [number, number] {
+  let [from, to] = [low ?? 0, high ?? 1];
+  if (limit !== undefined) [from, to] = [Math.min(from, limit), Math.max(to, limit)];
+  const pad = 0.06 * (to - from) || 0.05 * Math.abs(to) || 1;
+  return [from >= 0 && from < pad ? 0 : from - pad, to + pad];
+}
