@@ -51,5 +51,9 @@ class MissingExtraError(ColiftError):
     """A part calls a package that is not installed; the message names the extra that brings it."""
 
 
+class BrowserError(ColiftError):
+    """No browser was found to draw in, or it could not draw."""
+
+
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""

@@ -1,6 +1,6 @@
 // Views: orbit freely, follow the load, look from the top or the side. Views of several flights move as one.
 
-import { type Box3, MOUSE, type PerspectiveCamera, Vector3 } from "three";
+import { Box3, MOUSE, type PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
 export const VIEWS = ["orbit", "follow", "top", "side"] as const;
@@ -13,26 +13,28 @@ const TOWARDS: Record<View, [number, number, number]> = {
   side: [0, -1, 0.03],
 };
 
+/** Part of the window that a fitted flight fills, and how near a followed load is, m. */
+const FILL = 0.84;
+const NEAR = 5;
+
 export class Rig {
   view: View = "orbit";
   private readonly controls: OrbitControls;
   private readonly centre = new Vector3();
   private readonly load = new Vector3();
-  private readonly radius: number;
   private readonly listeners: (() => void)[] = [];
 
   constructor(
     readonly camera: PerspectiveCamera,
     canvas: HTMLCanvasElement,
-    box: Box3,
+    private readonly points: Vector3[],
   ) {
     this.controls = new OrbitControls(camera, canvas);
     this.controls.enableDamping = false;
     this.controls.mouseButtons = { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
     this.controls.minDistance = 0.3;
     this.controls.maxDistance = 60;
-    box.getCenter(this.centre);
-    this.radius = Math.max(0.5 * box.getSize(new Vector3()).length(), 0.8);
+    new Box3().setFromPoints(points).getCenter(this.centre);
     this.load.copy(this.centre);
     this.controls.addEventListener("change", () => this.listeners.forEach((listener) => listener()));
     this.set("orbit");
@@ -49,12 +51,26 @@ export class Rig {
   set(view: View): void {
     this.view = view;
     const target = view === "follow" ? this.load : this.centre;
-    const radius = view === "follow" ? Math.min(this.radius, 1.5) : this.radius;
-    const half = (this.camera.fov * Math.PI) / 360;
-    const fit = radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
     this.controls.target.copy(target);
-    this.camera.position.set(...TOWARDS[view]).setLength(0.74 * fit).add(target);
+    this.camera.position.set(...TOWARDS[view]).normalize().add(target);
+    this.camera.lookAt(target);
+    this.camera.position.sub(target).setLength(view === "follow" ? Math.min(this.fit(), NEAR) : this.fit());
+    this.camera.position.add(target);
     this.controls.update();
+  }
+
+  /** Distance from the centre at which the whole flight is seen, the way the camera looks now. */
+  private fit(): number {
+    const up = Math.tan((this.camera.fov * Math.PI) / 360) * FILL;
+    const back = this.camera.quaternion.clone().invert();
+    const seen = new Vector3();
+    let distance = 1;
+    for (const point of this.points) {
+      seen.copy(point).sub(this.centre).applyQuaternion(back);
+      const wide = Math.max(Math.abs(seen.x) / (up * this.camera.aspect), Math.abs(seen.y) / up);
+      distance = Math.max(distance, wide + seen.z);
+    }
+    return distance;
   }
 
   follow(load: ArrayLike<number>): void {

@@ -106,10 +106,11 @@ export class Flight {
   events: Mark[] = [];
   /** Grows with every change of the rows. */
   version = 0;
-  /** Largest tension so far, N: the end of the colour scale. */
-  peak = 0;
+  /** End of the colour scale of tension, N: twice a cable's share of the load, the same however it flies. */
+  readonly full: number;
 
   constructor(readonly info: FlightInfo) {
+    this.full = (2 * info.weight) / info.n || 1;
     const columns = { error: new Column(1), angle: new Column(1), spin: new Column(info.n) } as Flight["columns"];
     for (const name of SIGNALS) columns[name] = new Column(WIDTHS[name](info.n));
     this.columns = columns;
@@ -148,7 +149,7 @@ export class Flight {
     const { columns, n } = this;
     const step = this.rows ? time - this.end : 0;
     for (const name of SIGNALS) columns[name].push(values[name]);
-    const { load, reference, directions, thrusts, tensions } = values;
+    const { load, reference, directions, thrusts } = values;
     columns.error.push([Math.hypot(load[0]! - reference[0]!, load[1]! - reference[1]!, load[2]! - reference[2]!)]);
     columns.angle.push([n > MOST_PAIRED ? NaN : closest(directions, n).angle]);
     const spin = new Float32Array(n);
@@ -157,7 +158,6 @@ export class Flight {
       // The rotors turn slower than real ones, so that the eye can follow them.
       const rate = Number.isFinite(thrusts[i]) ? 8 * Math.sqrt(Math.max(thrusts[i]!, 0) / 5) : 8;
       spin[i] = (before + rate * step) % (200 * Math.PI);
-      if (tensions[i]! > this.peak && Number.isFinite(tensions[i])) this.peak = tensions[i]!;
     }
     columns.spin.push(spin);
     this.time.push([time]);
@@ -168,7 +168,6 @@ export class Flight {
     this.time.rows = 0;
     for (const column of Object.values(this.columns)) column.rows = 0;
     this.events = [];
-    this.peak = 0;
     this.version += 1;
   }
 

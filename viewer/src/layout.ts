@@ -162,15 +162,18 @@ export class Cockpit {
     });
     const several = this.flights.length > 1;
     const title = several ? [el("div", { class: `title ${flight.info.level}` }, el("b", {}, flight.info.label), el("span", {}, flight.info.verdict))] : [];
-    const peak = el("span");
-    const scale = el("div", { class: "tension-scale" }, el("span", {}, "slack"), el("i"), peak);
-    this.clock.onChange(() => (peak.textContent = `${flight.peak.toFixed(1)} N`));
+    const full = `${Number(flight.full.toPrecision(2))} N or more`;
+    const scale = el("div", { class: "tension-scale" }, el("span", {}, "slack"), el("i"), el("span", {}, full));
     return el(
       "section",
       { class: "scene", "aria-label": flight.info.label },
       stage.element,
-      ...title,
-      el("dl", { class: "hud" }, ...cells.map((cell) => el("div", {}, el("dt", {}, cell.name), el("dd", {}, cell.out)))),
+      el(
+        "div",
+        { class: "overlay" },
+        ...title,
+        el("dl", { class: "hud" }, ...cells.map((cell) => el("div", {}, el("dt", {}, cell.name), el("dd", {}, cell.out)))),
+      ),
       scale,
     );
   }

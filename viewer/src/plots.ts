@@ -2,7 +2,7 @@
 
 import uPlot from "uplot";
 import type { Clock } from "./clock";
-import type { Flight } from "./data";
+import { angleBetween, type Flight } from "./data";
 import { el, format } from "./dom";
 import { theme } from "./theme";
 
@@ -12,6 +12,8 @@ interface Line {
   dash: number[];
   width: number;
   values: (row: number) => number;
+  /** Drawn, but neither named nor read. */
+  quiet?: boolean;
 }
 
 interface Plot {
@@ -23,6 +25,8 @@ interface Plot {
   /** The one line that stands for a flight beside others. */
   summary: (flight: Flight) => (row: number) => number;
   summaryTitle: string;
+  /** Vertical axis in powers of ten. */
+  log?: boolean;
   /** A level not to fall below, drawn across. */
   limit?: (flight: Flight) => number;
 }
@@ -30,18 +34,48 @@ interface Plot {
 /** Above so many drones only a summary is drawn. */
 const MANY = 12;
 
-const perDrone = (flight: Flight, name: "tensions" | "thrusts"): Line[] =>
+/** Above so many drones not every pair is drawn. */
+const MANY_PAIRED = 5;
+
+const perDrone = (flight: Flight): Line[] =>
   Array.from({ length: flight.n }, (_, i) => ({
     label: `${i + 1}`,
     ...theme.drone(i),
     width: 1.6,
-    values: (row: number) => flight.columns[name].at(row, i),
+    values: (row) => flight.columns.tensions.at(row, i),
   }));
 
-const over = (flight: Flight, name: "tensions", pick: (...values: number[]) => number) => (row: number) => {
+const wanted = (flight: Flight): Line[] =>
+  Array.from({ length: flight.n }, (_, i) => ({
+    label: `${i + 1} wanted`,
+    colour: `${theme.drone(i).colour}70`,
+    dash: [],
+    width: 1,
+    values: (row) => flight.columns.desired_tensions.at(row, i),
+    quiet: true,
+  }));
+
+const pairs = (flight: Flight): Line[] => {
+  if (flight.n > MANY_PAIRED) return [];
+  const { data } = flight.columns.directions;
+  const lines: Line[] = [];
+  for (let i = 0; i < flight.n; i++)
+    for (let j = i + 1; j < flight.n; j++)
+      lines.push({
+        label: `${i + 1}-${j + 1}`,
+        colour: theme.palette.unknown,
+        dash: [],
+        width: 0.8,
+        values: (row) => angleBetween(data.subarray(3 * flight.n * row, 3 * flight.n * (row + 1)), i, j),
+        quiet: true,
+      });
+  return lines;
+};
+
+const over = (flight: Flight, pick: (...values: number[]) => number) => (row: number) => {
   const found: number[] = [];
   for (let i = 0; i < flight.n; i++) {
-    const value = flight.columns[name].at(row, i);
+    const value = flight.columns.tensions.at(row, i);
     if (Number.isFinite(value)) found.push(value);
   }
   return found.length ? pick(...found) : NaN;
@@ -65,16 +99,16 @@ export const PLOTS: Plot[] = [
     digits: 3,
     lines: (flight) =>
       flight.n <= MANY
-        ? perDrone(flight, "tensions")
-        : [single("largest", over(flight, "tensions", Math.max)), single("smallest", over(flight, "tensions", Math.min))],
-    summary: (flight) => over(flight, "tensions", Math.max),
+        ? [...perDrone(flight), ...wanted(flight)]
+        : [single("largest", over(flight, Math.max)), single("smallest", over(flight, Math.min))],
+    summary: (flight) => over(flight, Math.max),
     summaryTitle: "Largest tension",
   },
   {
-    title: "Smallest angle between cables",
+    title: "Angle between cables",
     unit: "\u00b0",
     digits: 1,
-    lines: (flight) => [single("angle", (row) => flight.columns.angle.at(row))],
+    lines: (flight) => [single("smallest", (row) => flight.columns.angle.at(row)), ...pairs(flight)],
     summary: (flight) => (row) => flight.columns.angle.at(row),
     summaryTitle: "Smallest angle between cables",
     limit: (flight) => flight.info.safe_angle_deg,
@@ -97,9 +131,11 @@ export const PLOTS: Plot[] = [
     lines: (flight) => [single("longest", (row) => 1e6 * flight.columns.solve_time.at(row))],
     summary: (flight) => (row) => 1e6 * flight.columns.solve_time.at(row),
     summaryTitle: "Solve time",
+    log: true,
   },
 ];
 
+const SYNC = "colift";
 const FONT = "11px system-ui, sans-serif";
 
 /** One plot: a head with name and values at the cursor, and the curves. */
@@ -117,7 +153,6 @@ class Chart {
     private readonly plot: Plot,
     private readonly flights: Flight[],
     private readonly clock: Clock,
-    private readonly sync: uPlot.SyncPubSub,
     private readonly window: number,
   ) {
     this.element.append(this.head, this.host);
@@ -127,7 +162,7 @@ class Chart {
 
   /** Follow the clock, and the rows where they have grown. */
   update(): void {
-    if (!this.chart) return;
+    if (!this.chart || !this.host.clientWidth) return;
     const { start, end } = this.clock;
     const version = `${start} ${end} ${this.flights.map((flight) => flight.version).join()}`;
     if (version !== this.version) {
@@ -139,15 +174,13 @@ class Chart {
   }
 
   private data(): uPlot.AlignedData {
-    const first = this.flights[0]!;
-    const x = Array.from({ length: first.rows }, (_, row) => first.time.at(row));
-    if (this.flights.length === 1)
-      return [x, ...this.lines.map((line) => x.map((_, row) => gap(line.values(row))))];
     const tables = this.flights.map((flight, k): uPlot.AlignedData => {
-      const t = Array.from({ length: flight.rows }, (_, row) => flight.time.at(row));
-      return [t, t.map((_, row) => gap(this.lines[k]!.values(row)))];
+      const first = flight.rows ? flight.rowAt(this.clock.end - this.window) : 0;
+      const rows = Array.from({ length: flight.rows - first }, (_, row) => first + row);
+      const lines = this.flights.length > 1 ? [this.lines[k]!] : this.lines;
+      return [rows.map((row) => flight.time.at(row)), ...lines.map((line) => rows.map((row) => gap(line.values(row))))];
     });
-    return uPlot.join(tables, tables.map(() => [1, 2]));
+    return tables.length > 1 ? uPlot.join(tables) : tables[0]!;
   }
 
   private build(): void {
@@ -172,7 +205,7 @@ class Chart {
         pxAlign: false,
         legend: { show: false },
         cursor: {
-          sync: { key: this.sync.key },
+          sync: { key: SYNC },
           y: false,
           points: { size: 5 },
           drag: { x: false, y: false },
@@ -184,7 +217,8 @@ class Chart {
             },
           },
         },
-        scales: { x: { time: false }, y: { range: (_chart, low, high) => room(low, high, this.plot.limit?.(this.flights[0]!)) } },
+        padding: [6, 8, 0, 0],
+        scales: { x: { time: false }, y: this.scale() },
         axes: [
           { stroke: palette.soft, grid, ticks, font: FONT, size: 22, gap: 4, values: (_chart, splits) => splits.map((t) => `${t}`) },
           { stroke: palette.soft, grid, ticks, font: FONT, size: 42, gap: 6, space: 28 },
@@ -215,10 +249,14 @@ class Chart {
       this.data(),
       this.host,
     );
-    this.sync.sub(this.chart);
     this.version = "";
     this.header();
     this.update();
+  }
+
+  private scale(): uPlot.Scale {
+    if (this.plot.log) return { distr: 3 };
+    return { range: (_chart, low, high) => room(low, high, this.plot.limit?.(this.flights[0]!)) };
   }
 
   /** The limit, and where the clock stands. */
@@ -247,8 +285,9 @@ class Chart {
 
   private header(): void {
     const several = this.flights.length > 1;
-    this.values = this.lines.map(() => el("b"));
-    const keys = this.lines.map((line, k) => {
+    const named = this.lines.filter((line) => !line.quiet);
+    this.values = named.map(() => el("b"));
+    const keys = named.map((line, k) => {
       const swatch = document.createElementNS("http://www.w3.org/2000/svg", "svg");
       swatch.setAttribute("viewBox", "0 0 22 6");
       swatch.setAttribute("class", "swatch");
@@ -267,24 +306,26 @@ class Chart {
   /** Values where the mouse is, else where the clock is. */
   private read(): void {
     const time = this.hovered ?? this.clock.time;
-    this.lines.forEach((line, k) => {
+    this.values.forEach((cell, k) => {
+      const line = this.lines[k]!;
       const flight = this.flights[this.flights.length > 1 ? k : 0]!;
       const value = flight.rows ? line.values(flight.rowAt(time + 1e-9)) : NaN;
-      this.values[k]!.textContent = format(value, this.plot.digits);
+      cell.textContent = format(value, this.plot.digits);
     });
     this.element.classList.toggle("hovered", this.hovered !== null);
   }
 
   private resize(): void {
     const { clientWidth, clientHeight } = this.host;
-    if (clientWidth > 40 && clientHeight > 40) this.chart?.setSize({ width: clientWidth, height: clientHeight });
+    if (clientWidth < 40 || clientHeight < 40) return;
+    this.chart?.setSize({ width: clientWidth, height: clientHeight });
+    this.update();
   }
 }
 
 /** All plots; `window` is the length of the past that live plots show, s. */
 export function plots(flights: Flight[], clock: Clock, window = Infinity): { element: HTMLElement; update: () => void } {
-  const sync = uPlot.sync("colift");
-  const charts = PLOTS.map((plot) => new Chart(plot, flights, clock, sync, window));
+  const charts = PLOTS.map((plot) => new Chart(plot, flights, clock, window));
   const element = el("div", { class: "plots" }, ...charts.map((chart) => chart.element));
   return { element, update: () => charts.forEach((chart) => chart.update()) };
 }

@@ -6,6 +6,7 @@ export interface Palette {
   name: "dark" | "light";
   back: string;
   ground: string;
+  shade: string;
   line: string;
   ink: string;
   soft: string;
@@ -26,8 +27,9 @@ export interface Palette {
 const DARK: Palette = {
   name: "dark",
   back: "#0e1318",
-  ground: "#26303a",
-  line: "#3a4753",
+  ground: "#182027",
+  shade: "#05080a",
+  line: "#34404b",
   ink: "#e6ebf0",
   soft: "#8e9ba8",
   drones: ["#56b4e9", "#f0883e", "#2fc79a", "#e08bc0", "#f2c14e", "#9fb8ff", "#c2a878", "#b79af0"],
@@ -47,8 +49,9 @@ const DARK: Palette = {
 const LIGHT: Palette = {
   name: "light",
   back: "#f4f6f8",
-  ground: "#dde3e8",
-  line: "#bac4cd",
+  ground: "#e6eaee",
+  shade: "#41505e",
+  line: "#c2cbd3",
   ink: "#1b2229",
   soft: "#5b6773",
   drones: ["#0072b2", "#d55e00", "#009e73", "#b8559a", "#b97f00", "#4766c9", "#7f6000", "#5d3a9b"],

@@ -5,6 +5,9 @@ import type { Flight } from "./data";
 import { button, el, icon, ICONS } from "./dom";
 import { KINDS, type Mark } from "./events";
 
+/** Least distance of two marks, per cent of the track. */
+const NUDGE = 1.1;
+
 export class Timeline {
   readonly element: HTMLElement;
   private readonly toggle: HTMLButtonElement;
@@ -96,13 +99,20 @@ export class Timeline {
     const state = `${start} ${end} ${this.flights.map((flight) => flight.events.length).join()}`;
     if (state === this.drawn) return;
     this.drawn = state;
-    this.marks.replaceChildren(
-      ...this.flights.flatMap((flight, k) => flight.events.map((mark) => this.mark(mark, flight, k))),
-    );
+    this.marks.replaceChildren();
+    this.flights.forEach((flight, lane) => {
+      let taken = -Infinity;
+      for (const mark of flight.events) {
+        // Marks of about the same time stand beside each other.
+        const place = Math.max(this.part(mark.time), taken + NUDGE);
+        taken = place;
+        this.marks.append(this.mark(mark, flight, lane, place));
+      }
+    });
     this.marks.style.height = `${18 * this.flights.length}px`;
   }
 
-  private mark(mark: Mark, flight: Flight, lane: number): HTMLElement {
+  private mark(mark: Mark, flight: Flight, lane: number, place: number): HTMLElement {
     const who = this.flights.length > 1 ? `${flight.info.label}: ` : "";
     const made = button(
       "",
@@ -111,7 +121,7 @@ export class Timeline {
       icon(KINDS[mark.kind].shape, 12),
     );
     made.className = `mark ${mark.kind}`;
-    made.style.left = `${this.part(mark.time).toFixed(3)}%`;
+    made.style.left = `${place.toFixed(3)}%`;
     made.style.top = `${18 * lane}px`;
     return made;
   }

@@ -112,6 +112,7 @@ def _flight(
         ],
         "mission": tomli_w.dumps(mission.resolved()),
         "events": events,
+        "end": float(recording.time[-1]),
         "time": _packed(recording.time[rows], "<f8"),
         "signals": {
             **{name: _packed(values[rows], "<f4") for name, values in signals.items()},

@@ -7,7 +7,7 @@ import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeome
 import { tensionColour, theme, type Palette } from "../theme";
 import type { Maker } from "./element";
 
-/** Below this part of the largest tension a cable is drawn slack. */
+/** Below this part of the colour scale a cable is drawn slack. */
 const SLACK = 1e-4;
 const PIECES = 25;
 
@@ -37,9 +37,9 @@ export const cables: Maker = (flight) => {
         from.fromArray(frame.positions, 3 * i);
         const tension = frame.tensions[i]!;
         if (!Number.isFinite(from.x + to.x)) continue;
-        if (!Number.isFinite(tension) || tension > SLACK * flight.peak) {
+        if (!Number.isFinite(tension) || tension > SLACK * flight.full) {
           straight.push(...from, ...to);
-          const { r, g, b } = tensionColour(tension / (flight.peak || 1), palette);
+          const { r, g, b } = tensionColour(tension / flight.full, palette);
           colours.push(r, g, b, r, g, b);
           continue;
         }

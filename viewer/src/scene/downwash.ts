@@ -7,9 +7,9 @@ import type { Maker } from "./element";
 const OPENING = (12 * Math.PI) / 180;
 
 export const downwash: Maker = (flight, { drone }) => {
-  const length = 1.5 * Math.max(...flight.info.cable_lengths);
+  const length = 1.2 * Math.max(...flight.info.cable_lengths);
   const cone = new ConeGeometry(drone + length * Math.tan(OPENING), length, 28, 1, true).rotateX(Math.PI / 2).translate(0, 0, -length / 2);
-  const material = new MeshBasicMaterial({ transparent: true, opacity: 0.13, side: DoubleSide, depthWrite: false });
+  const material = new MeshBasicMaterial({ transparent: true, opacity: 0.07, side: DoubleSide, depthWrite: false });
   const object = new InstancedMesh(cone, material, flight.n);
   object.frustumCulled = false;
   const matrix = new Matrix4();

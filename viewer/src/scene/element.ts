@@ -30,6 +30,9 @@ export interface Scale {
   drone: number;
   /** Height of the ground. */
   floor: number;
+  /** Middle of where things fly, and how far from it they get. */
+  centre: Vector3;
+  radius: number;
 }
 
 export type Maker = (flight: Flight, scale: Scale) => Element;

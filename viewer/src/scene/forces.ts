@@ -5,6 +5,7 @@ import type { Frame } from "../data";
 import type { Maker } from "./element";
 
 const UP = new Vector3(0, 0, 1);
+const NONE = new Matrix4().makeScale(0, 0, 0);
 
 /** Arrows of one colour. */
 class Arrows {
@@ -31,14 +32,18 @@ class Arrows {
   set(i: number, from: Vector3, vector: Vector3): void {
     const length = vector.length();
     const shown = Number.isFinite(length + from.x) && length > 4 * this.radius;
-    const head = shown ? Math.min(5 * this.radius, 0.5 * length) : 0;
-    this.turn.setFromUnitVectors(UP, this.tip.copy(vector).normalize());
-    const wide = shown ? this.radius : 0;
-    this.matrix.compose(from, this.turn, this.size.set(wide, wide, shown ? length - head : 0));
-    this.shafts.setMatrixAt(i, this.matrix);
-    this.tip.multiplyScalar(length - head).add(from);
-    this.matrix.compose(this.tip, this.turn, this.size.set(2.4 * wide, 2.4 * wide, head));
-    this.heads.setMatrixAt(i, this.matrix);
+    if (shown) {
+      const head = Math.min(5 * this.radius, 0.5 * length);
+      this.turn.setFromUnitVectors(UP, this.tip.copy(vector).divideScalar(length));
+      this.matrix.compose(from, this.turn, this.size.set(this.radius, this.radius, length - head));
+      this.shafts.setMatrixAt(i, this.matrix);
+      this.tip.multiplyScalar(length - head).add(from);
+      this.matrix.compose(this.tip, this.turn, this.size.set(2.4 * this.radius, 2.4 * this.radius, head));
+      this.heads.setMatrixAt(i, this.matrix);
+    } else {
+      this.shafts.setMatrixAt(i, NONE);
+      this.heads.setMatrixAt(i, NONE);
+    }
     this.shafts.instanceMatrix.needsUpdate = this.heads.instanceMatrix.needsUpdate = true;
   }
 }

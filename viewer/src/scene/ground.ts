@@ -1,36 +1,55 @@
-// The ground: a grid of metres with its scale written, axes, and what lies straight below load and drones.
+// The ground: a grid of metres that fades out, its scale written, axes, and what lies straight below load and drones.
 
 import { BufferGeometry, CircleGeometry, Color, Float32BufferAttribute, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, MeshBasicMaterial, Vector3 } from "three";
 import type { Maker } from "./element";
 
-const HALF = 6;
-
-function grid(every: number, skip: number): BufferGeometry {
+/** Lines `every` metres around a centre, cut into pieces so that each end has a colour of its own. */
+function grid(centre: Vector3, half: number, every: number): number[] {
   const points: number[] = [];
-  for (let k = -HALF; k <= HALF; k += every) {
-    if (skip && Math.abs(k % skip) < 1e-9) continue;
-    points.push(k, -HALF, 0, k, HALF, 0, -HALF, k, 0, HALF, k, 0);
+  for (let k = -half; k <= half; k += every) {
+    for (let s = -half; s < half; s += 1) {
+      points.push(k, s, 0, k, s + 1, 0, s, k, 0, s + 1, k, 0);
+    }
   }
-  return new BufferGeometry().setAttribute("position", new Float32BufferAttribute(points, 3));
+  return points.map((value, i) => value + (i % 3 === 0 ? centre.x : i % 3 === 1 ? centre.y : 0));
 }
 
-export const ground: Maker = (flight, { floor, drone }) => {
+/** Colours of points that go from one at the centre to the other at the rim. */
+function fade(points: number[], centre: Vector3, half: number, from: Color, to: Color): number[] {
+  const colours: number[] = [];
+  const mixed = new Color();
+  for (let k = 0; k < points.length; k += 3) {
+    const distance = Math.hypot(points[k]! - centre.x, points[k + 1]! - centre.y) / half;
+    mixed.copy(from).lerp(to, Math.min(distance, 1));
+    colours.push(mixed.r, mixed.g, mixed.b);
+  }
+  return colours;
+}
+
+export const ground: Maker = (flight, { floor, drone, centre: middle, radius }) => {
   const object = new Group();
-  const major = new LineBasicMaterial();
-  const minor = new LineBasicMaterial({ transparent: true, opacity: 0.45 });
-  const lines = [new LineSegments(grid(1, 0), major), new LineSegments(grid(0.25, 1), minor)];
-  lines[1]!.visible = flight.n <= 64;
+  const centre = new Vector3(Math.round(middle.x), Math.round(middle.y), 0);
+  const half = Math.ceil(radius + 2.5);
+  const layers = [
+    { every: 0.25, colour: "ground" as const },
+    { every: 1, colour: "line" as const },
+  ].map(({ every, colour }) => {
+    const points = grid(centre, half, every);
+    const geometry = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(points, 3));
+    const lines = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true }));
+    lines.position.z = 0.001 * every;
+    return { points, lines, colour };
+  });
   const axes = new LineSegments(
     new BufferGeometry().setAttribute("position", new Float32BufferAttribute([0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 0], 3)),
     new LineBasicMaterial(),
   );
-  axes.position.z = 0.002;
-  const shade = new MeshBasicMaterial({ transparent: true, opacity: 0.3, depthWrite: false });
+  axes.position.z = 0.003;
+  const shade = new MeshBasicMaterial({ transparent: true, opacity: 0.22, depthWrite: false });
   const spots = new InstancedMesh(new CircleGeometry(1, 28), shade, flight.n + 1);
-  spots.frustumCulled = false;
   const plumb = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ transparent: true, opacity: 0.55 }));
-  plumb.frustumCulled = false;
-  object.add(...lines, axes, spots, plumb);
+  spots.frustumCulled = plumb.frustumCulled = false;
+  object.add(...layers.map(({ lines }) => lines), axes, spots, plumb);
   object.position.z = floor;
 
   const matrix = new Matrix4();
@@ -38,12 +57,14 @@ export const ground: Maker = (flight, { floor, drone }) => {
   return {
     object,
     paint(palette) {
-      object.position.z = floor;
-      major.color.set(palette.line);
-      minor.color.set(palette.ground);
-      (axes.material as LineBasicMaterial).color.set(palette.soft);
-      (plumb.material as LineBasicMaterial).color.set(palette.soft);
-      shade.color.copy(new Color(palette.name === "dark" ? "#000000" : "#41505e"));
+      const back = new Color(palette.back);
+      for (const { points, lines, colour } of layers) {
+        const colours = fade(points, centre, half, new Color(palette[colour]), back);
+        lines.geometry.setAttribute("color", new Float32BufferAttribute(colours, 3));
+      }
+      axes.material.color.set(palette.soft);
+      plumb.material.color.set(palette.soft);
+      shade.color.set(palette.shade);
     },
     update(frame, shown, labels) {
       for (let i = 0; i <= frame.n; i++) {
@@ -58,7 +79,7 @@ export const ground: Maker = (flight, { floor, drone }) => {
       plumb.geometry.setAttribute("position", new Float32BufferAttribute([x, y, z - floor, x, y, 0], 3));
       plumb.visible = Number.isFinite(x);
       if (!shown.labels) return;
-      labels.put("1 m", at.set(1.08, 0, floor), "scale");
+      labels.put("1 m", at.set(1.12, 0, floor), "scale");
       labels.put("x", at.set(0.5, -0.09, floor), "scale");
       labels.put("y", at.set(-0.09, 0.5, floor), "scale");
     },

@@ -26,6 +26,8 @@ export class Stage {
   private readonly overlay: Overlay;
   private readonly elements: Element[];
   private frame: Frame | null = null;
+  /** Whether a picture of the right size has been drawn. */
+  drawn = false;
 
   constructor(
     flight: Flight,
@@ -35,14 +37,20 @@ export class Stage {
     this.renderer.domElement.setAttribute("aria-label", `3D view of ${flight.info.name}`);
     const camera = new PerspectiveCamera(38, 1, 0.05, 400);
     camera.up.set(0, 0, 1);
-    const box = extent(flight);
-    this.rig = new Rig(camera, this.renderer.domElement, box);
+    const points = places(flight);
+    const box = new Box3().setFromPoints(points);
+    this.rig = new Rig(camera, this.renderer.domElement, points);
     this.overlay = new Overlay(camera);
     this.element.append(this.renderer.domElement, this.overlay.element);
 
     const lengths = flight.info.cable_lengths;
     const mean = lengths.reduce((sum, length) => sum + length, 0) / lengths.length;
-    const scale = { drone: 0.17 * mean, floor: Math.min(0, Math.floor(box.min.z + 0.3)) };
+    const scale = {
+      drone: 0.17 * mean,
+      floor: Math.min(0, Math.floor(box.min.z + 0.3)),
+      centre: box.getCenter(new Vector3()),
+      radius: 0.5 * box.getSize(new Vector3()).length(),
+    };
     this.elements = MAKERS.map((make) => make(flight, scale));
     const sun = new DirectionalLight("#ffffff", 2.1);
     sun.position.set(3, -4, 8);
@@ -92,21 +100,20 @@ export class Stage {
     this.renderer.setSize(clientWidth, clientHeight);
     this.rig.resize(clientWidth / clientHeight);
     this.draw();
+    this.drawn = true;
   }
 }
 
-/** The box of everything that flies. */
-function extent(flight: Flight): Box3 {
-  const box = new Box3();
-  const point = new Vector3();
+/** Where things are in the course of the flight, thinned. */
+function places(flight: Flight): Vector3[] {
+  const points: Vector3[] = [];
   for (const column of [flight.columns.load, flight.columns.reference, flight.columns.positions]) {
-    for (let row = 0; row < flight.rows; row += Math.ceil(flight.rows / 400)) {
+    for (let row = 0; row < flight.rows; row += Math.ceil(flight.rows / 150)) {
       for (let k = 0; k < column.width; k += 3) {
-        point.set(column.at(row, k), column.at(row, k + 1), column.at(row, k + 2));
-        if (point.length() < 1e3) box.expandByPoint(point);
+        const point = new Vector3(column.at(row, k), column.at(row, k + 1), column.at(row, k + 2));
+        if (point.length() < 1e3) points.push(point);
       }
     }
   }
-  if (box.isEmpty()) box.set(new Vector3(-1, -1, 0), new Vector3(1, 1, 2.5));
-  return box;
+  return points.length ? points : [new Vector3(-1.5, -1.5, 0), new Vector3(1.5, 1.5, 2.5)];
 }
