@@ -14,7 +14,7 @@ const TOWARDS: Record<View, [number, number, number]> = {
 };
 
 /** Part of the window that a fitted flight fills, and how near a followed load is, m. */
-const FILL = 0.84;
+const FILL = 0.92;
 const NEAR = 5;
 
 export class Rig {
@@ -28,6 +28,7 @@ export class Rig {
     readonly camera: PerspectiveCamera,
     canvas: HTMLCanvasElement,
     private readonly points: Vector3[],
+    private readonly margin: number,
   ) {
     this.controls = new OrbitControls(camera, canvas);
     this.controls.enableDamping = false;
@@ -67,7 +68,7 @@ export class Rig {
     let distance = 1;
     for (const point of this.points) {
       seen.copy(point).sub(this.centre).applyQuaternion(back);
-      const wide = Math.max(Math.abs(seen.x) / (up * this.camera.aspect), Math.abs(seen.y) / up);
+      const wide = Math.max((Math.abs(seen.x) + this.margin) / (up * this.camera.aspect), (Math.abs(seen.y) + this.margin) / up);
       distance = Math.max(distance, wide + seen.z);
     }
     return distance;

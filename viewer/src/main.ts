@@ -27,7 +27,6 @@ function automate(cockpit: Cockpit): void {
         time: clock.time,
         end: clock.end,
         playing: clock.playing,
-        drawn: cockpit.stages.every((stage) => stage.drawn),
         speed: clock.speed,
         view: cockpit.view,
         theme: theme.palette.name,

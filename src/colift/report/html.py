@@ -164,7 +164,7 @@ def write_report(
         drawing.save(folder / "figures")
     target = folder / "report.html"
     with atomic_path(target) as temporary:
-        text = report(recording, metrics, drawings, replay and replay.name)
+        text = report(recording, metrics, drawings, replay.name if replay else None)
         temporary.write_text(text, encoding="utf-8", newline="\n")
     return target
 

@@ -86,7 +86,9 @@ def _flight(
         "cable_lengths": mission.team.cable_lengths.tolist(),
         "safe_angle_deg": SAFE_ANGLE,
         "weight": mission.load.mass * mission.world.gravity,
-        "thrust": _number(np.nanmean(recording["thrusts"])),
+        "thrust": (mission.load.mass + mission.team.masses.sum())
+        * mission.world.gravity
+        / recording.n,
         "facts": {
             "allocator": mission.kinds["allocation"],
             "reference": mission.kinds["reference"],
@@ -142,8 +144,7 @@ def _rows(
     count = min(RATE * length, max(affordable, LEAST_RATE * length)) + 1
     kept = [np.linspace(time[0], time[-1], max(2, int(count))), np.asarray(moments, dtype=float)]
     wanted = np.concatenate(kept)
-    after = np.clip(np.searchsorted(time, wanted), 1, max(1, len(time) - 1))
-    nearest = after - (wanted - time[after - 1] < time[np.minimum(after, len(time) - 1)] - wanted)
+    nearest = np.searchsorted((time[1:] + time[:-1]) / 2.0, wanted)
     return np.unique(np.concatenate([nearest, _extremes(recording), [0, len(time) - 1]]))
 
 

@@ -44,7 +44,7 @@ def _event(time: float, kind: str, text: str, drone: int | None = None) -> dict[
     return {"time": float(time), "kind": kind, "text": text, "drone": drone}
 
 
-def _stretches(time: NDArray[np.float64], where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _stretches(time: NDArray[np.float64], where: Any) -> list[tuple[int, int]]:
     """First and last row of each stretch in which ``where`` holds; short pauses do not end one."""
     rows = np.flatnonzero(where)
     if not len(rows):
@@ -90,7 +90,7 @@ def _angle(recording: Recording) -> list[dict[str, Any]]:
     angles = np.degrees(pairwise_angles(recording["directions"]))
     one, other = np.triu_indices(n, k=1)
     found = []
-    for first, last in _stretches(recording.time, (angles < SAFE_ANGLE).any(axis=1)):
+    for first, last in _stretches(recording.time, np.any(angles < SAFE_ANGLE, axis=1)):
         part = np.where(np.isfinite(angles[first : last + 1]), angles[first : last + 1], np.inf)
         pair = int(part.min(axis=0).argmin())
         text = (

@@ -21,6 +21,10 @@ ASSETS = resources.files("colift.viewer") / "assets"
 """The built front end: ``viewer.js``, ``viewer.css`` and the licences of what they contain."""
 
 
+DRAWN = ".cockpit:not(:has(.stage:not([data-drawn])))"
+"""Selector that matches once every scene of a page has drawn its first picture."""
+
+
 def replay_page(data: Mapping[str, Any], **view: Any) -> str:
     """A self-contained page of one or more flights.
 

@@ -15,7 +15,7 @@ import numpy as np
 from colift.errors import BrowserError, MissingExtraError
 from colift.recording import atomic_path
 from colift.viewer.browser import browser
-from colift.viewer.page import write_page
+from colift.viewer.page import DRAWN, write_page
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -69,7 +69,7 @@ def film(
     end: float,
     rate: float,
     speed: float = 1.0,
-    progress: Callable[[float], None] = lambda fraction: None,
+    progress: Callable[[float], None] | None = None,
 ) -> Path:
     """Write a GIF or an MP4 (by the file's name) of the flight from ``begin`` to ``end``, atomically.
 
@@ -99,12 +99,13 @@ def film(
     return path
 
 
-def _frames(page: Page, times: Any, progress: Callable[[float], None]) -> Iterator[Any]:
+def _frames(page: Page, times: Any, progress: Callable[[float], None] | None) -> Iterator[Any]:
     from PIL import Image
 
     for k, time in enumerate(times):
         yield Image.open(io.BytesIO(_shot(page, float(time)))).convert("RGB")
-        progress((k + 1) / len(times))
+        if progress is not None:
+            progress((k + 1) / len(times))
 
 
 def _write_gif(path: Path, frames: Iterator[Any], size: tuple[int, int], rate: float) -> None:
@@ -147,7 +148,7 @@ def _opened(data: Mapping[str, Any], look: Look) -> Iterator[Page]:
         page = started.new_page(viewport={"width": width, "height": height})
         try:
             page.goto(file.as_uri())
-            page.wait_for_function("window.colift?.state().drawn", timeout=START_TIMEOUT)
+            page.locator(DRAWN).wait_for(timeout=START_TIMEOUT)
         except Error as error:
             raise BrowserError(f"the page could not be drawn: {error.message}") from error
         yield page

@@ -36,7 +36,7 @@ export const cables: Maker = (flight) => {
       for (let i = 0; i < frame.n; i++) {
         from.fromArray(frame.positions, 3 * i);
         const tension = frame.tensions[i]!;
-        if (!Number.isFinite(from.x + to.x)) continue;
+        if (!Number.isFinite(from.lengthSq() + to.lengthSq())) continue;
         if (!Number.isFinite(tension) || tension > SLACK * flight.full) {
           straight.push(...from, ...to);
           const { r, g, b } = tensionColour(tension / flight.full, palette);

@@ -26,8 +26,6 @@ export class Stage {
   private readonly overlay: Overlay;
   private readonly elements: Element[];
   private frame: Frame | null = null;
-  /** Whether a picture of the right size has been drawn. */
-  drawn = false;
 
   constructor(
     flight: Flight,
@@ -37,20 +35,19 @@ export class Stage {
     this.renderer.domElement.setAttribute("aria-label", `3D view of ${flight.info.name}`);
     const camera = new PerspectiveCamera(38, 1, 0.05, 400);
     camera.up.set(0, 0, 1);
-    const points = places(flight);
-    const box = new Box3().setFromPoints(points);
-    this.rig = new Rig(camera, this.renderer.domElement, points);
-    this.overlay = new Overlay(camera);
-    this.element.append(this.renderer.domElement, this.overlay.element);
-
     const lengths = flight.info.cable_lengths;
     const mean = lengths.reduce((sum, length) => sum + length, 0) / lengths.length;
+    const points = places(flight);
+    const box = new Box3().setFromPoints(points);
     const scale = {
       drone: 0.17 * mean,
       floor: Math.min(0, Math.floor(box.min.z + 0.3)),
       centre: box.getCenter(new Vector3()),
       radius: 0.5 * box.getSize(new Vector3()).length(),
     };
+    this.rig = new Rig(camera, this.renderer.domElement, points, 2.2 * scale.drone);
+    this.overlay = new Overlay(camera);
+    this.element.append(this.renderer.domElement, this.overlay.element);
     this.elements = MAKERS.map((make) => make(flight, scale));
     const sun = new DirectionalLight("#ffffff", 2.1);
     sun.position.set(3, -4, 8);
@@ -100,7 +97,7 @@ export class Stage {
     this.renderer.setSize(clientWidth, clientHeight);
     this.rig.resize(clientWidth / clientHeight);
     this.draw();
-    this.drawn = true;
+    if (this.frame) this.element.dataset.drawn = "";
   }
 }
 
