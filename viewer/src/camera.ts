@@ -49,6 +49,12 @@ export class Rig {
     this.controls.enabled = on;
   }
 
+  /** Angle about the vertical by which the camera is turned from looking along y, rad. */
+  get heading(): number {
+    const away = this.controls.target.clone().sub(this.camera.position);
+    return Math.atan2(-away.x, away.y);
+  }
+
   set(view: View): void {
     this.view = view;
     const target = view === "follow" ? this.load : this.centre;

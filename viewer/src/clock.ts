@@ -8,7 +8,9 @@ export class Clock {
   end = 0;
   playing = false;
   speed = 1;
-  /** Live: stay at the end as it moves. */
+  /** The end moves; who plays up to it stays there. */
+  live = false;
+  /** Stay at the end as it moves. */
   following = false;
   private readonly listeners: (() => void)[] = [];
   private last = 0;
@@ -19,7 +21,7 @@ export class Clock {
 
   seek(time: number): void {
     this.time = Math.min(Math.max(time, this.start), this.end);
-    this.following = false;
+    this.following = this.live && time >= this.end;
     this.tell();
   }
 
@@ -45,7 +47,7 @@ export class Clock {
   span(start: number, end: number): void {
     this.start = start;
     this.end = end;
-    if (this.following || this.time > end || this.time < start) this.time = this.following ? end : Math.min(Math.max(this.time, start), end);
+    this.time = this.following ? end : Math.min(Math.max(this.time, start), end);
     this.tell();
   }
 
@@ -56,6 +58,7 @@ export class Clock {
     if (this.time >= this.end) {
       this.time = this.end;
       this.playing = false;
+      this.following = this.live;
     } else requestAnimationFrame((next) => this.tick(next));
     this.tell();
   }

@@ -104,6 +104,8 @@ export class Flight {
   readonly time = new Column(1, new Float64Array(64));
   readonly columns: Record<Signal | Derived, Column>;
   events: Mark[] = [];
+  /** Where the pilot drags the load to, while he does. */
+  target: [number, number, number] | null = null;
   /** Grows with every change of the rows. */
   version = 0;
   /** End of the colour scale of tension, N: twice a cable's share of the load, the same however it flies. */

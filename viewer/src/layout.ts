@@ -5,7 +5,7 @@ import { Clock } from "./clock";
 import type { Flight, Frame } from "./data";
 import { button, el, format, icon, ICONS } from "./dom";
 import { STATUS } from "./events";
-import { about, eventList, numbers, panel, type Tab } from "./panel";
+import { about, eventList, numbers, panel } from "./panel";
 import { plots } from "./plots";
 import type { Shown } from "./scene/element";
 import { Stage } from "./scene/stage";
@@ -37,9 +37,11 @@ export interface Options {
   camera?: string;
   /** Length of the past in the plots, s. */
   window?: number;
-  /** Tabs before the others, and things at the right end of the header. */
-  tabs?: Tab[];
+  /** A column of its own, and things at the right end of the header. */
+  side?: HTMLElement;
   extras?: HTMLElement[];
+  /** Keys that do something else than usual. */
+  keys?: Record<string, () => void>;
 }
 
 export class Cockpit {
@@ -64,16 +66,23 @@ export class Cockpit {
     this.help = this.makeHelp();
     const charts = plots(flights, clock, options.window);
     const list = eventList(flights, clock);
+    const table = numbers(flights);
     const tabs = [
-      ...(options.tabs ?? []),
       { name: "Plots", content: charts.element },
       { name: "Events", content: list.element },
-      { name: "Numbers", content: numbers(flights) },
-      { name: "Mission", content: about(flights) },
+      { name: "Numbers", content: table.element },
+      ...(flights.some((flight) => flight.info.mission) ? [{ name: "Mission", content: about(flights) }] : []),
     ];
     const scenes = el("main", { class: "scenes" }, ...this.stages.map((stage, k) => this.scene(stage, flights[k]!)), this.toolbar());
-    root.className = `cockpit${options.bare ? " bare" : ""}`;
-    root.replaceChildren(this.header(options.extras ?? []), scenes, panel(tabs), this.timeline.element, this.help);
+    root.className = `cockpit${options.bare ? " bare" : ""}${options.side ? " flying" : ""}`;
+    root.replaceChildren(
+      this.header(options.extras ?? []),
+      ...(options.side ? [options.side] : []),
+      scenes,
+      panel(tabs),
+      this.timeline.element,
+      this.help,
+    );
     for (const stage of this.stages)
       stage.rig.onMove(() => {
         for (const other of this.stages) if (other !== stage) other.rig.match(stage.rig), other.draw();
@@ -87,8 +96,9 @@ export class Cockpit {
       });
       charts.update();
       list.update();
+      table.update();
     });
-    addEventListener("keydown", (event) => this.key(event));
+    addEventListener("keydown", (event) => this.key(event, options.keys ?? {}));
     this.look((VIEWS as readonly string[]).includes(options.camera ?? "") ? (options.camera as View) : "orbit");
     this.refresh();
   }
@@ -185,7 +195,7 @@ export class Cockpit {
     return dialog;
   }
 
-  private key(event: KeyboardEvent): void {
+  private key(event: KeyboardEvent, others: Record<string, () => void>): void {
     const target = event.target as HTMLElement;
     if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName)) return;
     const { clock } = this;
@@ -204,7 +214,7 @@ export class Cockpit {
     };
     VIEWS.forEach((view, k) => (actions[`${k + 1}`] = () => this.look(view)));
     for (const [name, , key] of SWITCHES) actions[key] = () => this.flip(name);
-    const action = actions[event.key];
+    const action = others[event.key] ?? actions[event.key];
     if (!action || event.defaultPrevented || this.help.open) return;
     event.preventDefault();
     action();

@@ -4,6 +4,7 @@ import "uplot/dist/uPlot.min.css";
 import "./style.css";
 import { Flight, type Payload } from "./data";
 import { Cockpit } from "./layout";
+import { Session } from "./live/session";
 import { theme } from "./theme";
 
 const root = document.getElementById("app")!;
@@ -43,3 +44,7 @@ function automate(cockpit: Cockpit): void {
 }
 
 if (carried) replay(JSON.parse(carried.textContent!) as Payload);
+else {
+  theme.start();
+  new Session(root, automate);
+}

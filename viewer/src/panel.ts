@@ -1,13 +1,19 @@
 // The side panel: plots, numbers, events, and the mission, one tab each.
 
 import type { Clock } from "./clock";
-import type { Flight } from "./data";
+import type { Flight, Metric } from "./data";
 import { button, el, icon } from "./dom";
 import { KINDS } from "./events";
 
 export interface Tab {
   name: string;
   content: HTMLElement;
+}
+
+/** A part of the page that follows the clock. */
+export interface Part {
+  element: HTMLElement;
+  update: () => void;
 }
 
 export function panel(tabs: Tab[]): HTMLElement {
@@ -35,22 +41,32 @@ function value(number: number | null): string {
   return Math.abs(number) >= 1000 ? number.toFixed(0) : Number(number.toPrecision(4)).toString();
 }
 
-export function numbers(flights: Flight[]): HTMLElement {
+/** The table of metrics; rebuilt where they have changed. */
+export function numbers(flights: Flight[]): Part {
   const table = el("table", { class: "numbers" });
-  table.append(el("tr", {}, el("th"), ...flights.map((flight) => el("th", {}, flights.length > 1 ? flight.info.label : "value")), el("th", {}, "unit")));
-  for (const metric of flights[0]!.info.metrics) {
-    const cells = flights.map((flight) => {
-      const found = flight.info.metrics.find((other) => other.name === metric.name);
-      return el("td", {}, value(found ? found.value : null));
-    });
-    const unit = metric.unit === "1" ? "" : metric.unit;
-    table.append(el("tr", {}, el("th", { title: metric.name }, metric.meaning), ...cells, el("td", { class: "unit" }, unit)));
-  }
-  return el("div", { class: "page" }, table);
+  let drawn: Metric[] | null = null;
+  const update = (): void => {
+    const { metrics } = flights[0]!.info;
+    if (metrics === drawn) return;
+    drawn = metrics;
+    const heads = flights.map((flight) => el("th", {}, flights.length > 1 ? flight.info.label : "value"));
+    table.replaceChildren(el("tr", {}, el("th"), ...heads, el("th", {}, "unit")), ...metrics.map((metric) => row(metric, flights)));
+  };
+  update();
+  return { element: el("div", { class: "page" }, table), update };
+}
+
+function row(metric: Metric, flights: Flight[]): HTMLElement {
+  const cells = flights.map(({ info }) => {
+    const found = info.metrics.find((other) => other.name === metric.name);
+    return el("td", {}, value(found ? found.value : null));
+  });
+  const unit = metric.unit === "1" ? "" : metric.unit;
+  return el("tr", {}, el("th", { title: metric.name }, metric.meaning), ...cells, el("td", { class: "unit" }, unit));
 }
 
 /** The list of events; rebuilt where it has grown. */
-export function eventList(flights: Flight[], clock: Clock): { element: HTMLElement; update: () => void } {
+export function eventList(flights: Flight[], clock: Clock): Part {
   const list = el("ol", { class: "events" });
   const element = el("div", { class: "page" }, list);
   let drawn = -1;

@@ -4,6 +4,7 @@ import uPlot from "uplot";
 import type { Clock } from "./clock";
 import { angleBetween, type Flight } from "./data";
 import { el, format } from "./dom";
+import type { Part } from "./panel";
 import { theme } from "./theme";
 
 interface Line {
@@ -324,7 +325,7 @@ class Chart {
 }
 
 /** All plots; `window` is the length of the past that live plots show, s. */
-export function plots(flights: Flight[], clock: Clock, window = Infinity): { element: HTMLElement; update: () => void } {
+export function plots(flights: Flight[], clock: Clock, window = Infinity): Part {
   const charts = PLOTS.map((plot) => new Chart(plot, flights, clock, window));
   const element = el("div", { class: "plots" }, ...charts.map((chart) => chart.element));
   return { element, update: () => charts.forEach((chart) => chart.update()) };

@@ -15,8 +15,9 @@ import { ground } from "./ground";
 import { Overlay } from "./labels";
 import { load } from "./load";
 import { paths } from "./paths";
+import { target } from "./target";
 
-const MAKERS: Maker[] = [ground, paths, load, cables, drones, forces, angles, downwash];
+const MAKERS: Maker[] = [ground, paths, load, cables, drones, forces, angles, downwash, target];
 
 export class Stage {
   readonly element = el("div", { class: "stage" });
@@ -43,7 +44,7 @@ export class Stage {
       drone: 0.17 * mean,
       floor: Math.min(0, Math.floor(box.min.z + 0.3)),
       centre: box.getCenter(new Vector3()),
-      radius: 0.5 * box.getSize(new Vector3()).length(),
+      radius: Math.max(2, 0.5 * box.getSize(new Vector3()).length()),
     };
     this.rig = new Rig(camera, this.renderer.domElement, points, 2.2 * scale.drone);
     this.overlay = new Overlay(camera);
