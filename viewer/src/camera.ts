@@ -13,9 +13,8 @@ const TOWARDS: Record<View, [number, number, number]> = {
   side: [0, -1, 0.03],
 };
 
-/** Part of the window that a fitted flight fills, and how near a followed load is, m. */
+/** Part of the window that a fitted flight fills. */
 const FILL = 0.92;
-const NEAR = 5;
 
 export class Rig {
   view: View = "orbit";
@@ -29,6 +28,7 @@ export class Rig {
     canvas: HTMLCanvasElement,
     private readonly points: Vector3[],
     private readonly margin: number,
+    private readonly cable: number,
   ) {
     this.controls = new OrbitControls(camera, canvas);
     this.controls.enableDamping = false;
@@ -57,13 +57,21 @@ export class Rig {
 
   set(view: View): void {
     this.view = view;
-    const target = view === "follow" ? this.load : this.centre;
+    const follows = view === "follow";
+    // A followed formation stands above its load.
+    const target = (follows ? this.load : this.centre).clone();
+    if (follows) target.z += 0.5 * this.cable;
     this.controls.target.copy(target);
     this.camera.position.set(...TOWARDS[view]).normalize().add(target);
     this.camera.lookAt(target);
-    this.camera.position.sub(target).setLength(view === "follow" ? Math.min(this.fit(), NEAR) : this.fit());
-    this.camera.position.add(target);
+    this.camera.position.sub(target).setLength(follows ? this.near() : this.fit()).add(target);
     this.controls.update();
+  }
+
+  /** Distance at which the formation is seen with its arrows. */
+  private near(): number {
+    const half = (this.camera.fov * Math.PI) / 360;
+    return (this.cable + this.margin) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
   }
 
   /** Distance from the centre at which the whole flight is seen, the way the camera looks now. */

@@ -17,6 +17,7 @@ export class Timeline {
   private readonly thumb = el("div", { class: "thumb" });
   private readonly marks = el("div", { class: "marks" });
   private readonly speed = el("select", { "aria-label": "Speed", title: "Speed ([ and ])" });
+  private readonly edge: HTMLButtonElement;
   private drawn = "";
 
   constructor(
@@ -27,6 +28,8 @@ export class Timeline {
     for (const speed of SPEEDS) this.speed.append(el("option", { value: `${speed}` }, `${speed}\u00d7`));
     this.speed.addEventListener("change", () => clock.setSpeed(Number(this.speed.value)));
     this.track.append(el("div", { class: "rail" }), this.played, this.thumb);
+    this.edge = button("Live", "To the present (End)", () => clock.seek(clock.end));
+    this.edge.className = "edge";
     this.element = el(
       "section",
       { class: "timeline", "aria-label": "Time" },
@@ -40,6 +43,7 @@ export class Timeline {
       el("div", { class: "scrub" }, this.marks, this.track),
       this.readout,
       this.speed,
+      this.edge,
     );
     this.track.addEventListener("pointerdown", (down) => {
       this.track.setPointerCapture(down.pointerId);
@@ -88,6 +92,8 @@ export class Timeline {
     this.readout.textContent = `${clock.time.toFixed(2)} / ${clock.end.toFixed(2)} s`;
     this.toggle.replaceChildren(icon(clock.playing ? ICONS.pause : ICONS.play, 24, true));
     this.speed.value = `${clock.speed}`;
+    this.edge.hidden = !clock.live;
+    this.edge.setAttribute("aria-pressed", `${clock.following}`);
     for (const [name, value] of Object.entries({ min: clock.start, max: clock.end, now: clock.time }))
       this.track.setAttribute(`aria-value${name}`, value.toFixed(3));
     this.track.setAttribute("aria-valuetext", `${clock.time.toFixed(2)} seconds`);

@@ -46,7 +46,7 @@ export class Stage {
       centre: box.getCenter(new Vector3()),
       radius: Math.max(2, 0.5 * box.getSize(new Vector3()).length()),
     };
-    this.rig = new Rig(camera, this.renderer.domElement, points, 2.2 * scale.drone);
+    this.rig = new Rig(camera, this.renderer.domElement, points, 2.2 * scale.drone, mean);
     this.overlay = new Overlay(camera);
     this.element.append(this.renderer.domElement, this.overlay.element);
     this.elements = MAKERS.map((make) => make(flight, scale));
