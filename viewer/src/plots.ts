@@ -137,6 +137,8 @@ export const PLOTS: Plot[] = [
 ];
 
 const SYNC = "colift";
+/** Least time between two drawings of curves that grow, ms. */
+const PACE = 100;
 const FONT = "11px system-ui, sans-serif";
 
 /** One plot: a head with name and values at the cursor, and the curves. */
@@ -144,10 +146,13 @@ class Chart {
   readonly element = el("figure", { class: "plot" });
   private readonly host = el("div", { class: "curves" });
   private readonly head = el("figcaption");
+  /** Where the clock stands: moved, so that the curves need not be drawn again. */
+  private readonly now = el("div", { class: "now" });
   private chart: uPlot | null = null;
   private lines: Line[] = [];
   private values: HTMLElement[] = [];
   private version = "";
+  private drawn = -Infinity;
   private hovered: number | null = null;
 
   constructor(
@@ -166,11 +171,16 @@ class Chart {
     if (!this.chart || !this.host.clientWidth) return;
     const { start, end } = this.clock;
     const version = `${start} ${end} ${this.flights.map((flight) => flight.version).join()}`;
-    if (version !== this.version) {
+    const now = performance.now();
+    if (version !== this.version && !(this.window < Infinity && now - this.drawn < PACE)) {
       this.version = version;
+      this.drawn = now;
       this.chart.setData(this.data(), false);
       this.chart.setScale("x", { min: Math.max(start, end - this.window), max: Math.max(end, start + 1e-3) });
-    } else this.chart.redraw(false);
+    }
+    const place = this.chart.valToPos(this.clock.time, "x");
+    this.now.style.transform = `translateX(${place.toFixed(1)}px)`;
+    this.now.hidden = !(place >= 0 && place <= this.chart.over.clientWidth);
     this.read();
   }
 
@@ -250,6 +260,7 @@ class Chart {
       this.data(),
       this.host,
     );
+    this.chart.over.append(this.now);
     this.version = "";
     this.header();
     this.update();
@@ -260,28 +271,20 @@ class Chart {
     return { range: (_chart, low, high) => room(low, high, this.plot.limit?.(this.flights[0]!)) };
   }
 
-  /** The limit, and where the clock stands. */
-  private overlay(chart: uPlot): void {
-    const { ctx, bbox } = chart;
-    const { palette } = theme;
-    const rule = (x0: number, y0: number, x1: number, y1: number, colour: string, dash: number[]): void => {
-      ctx.save();
-      ctx.strokeStyle = colour;
-      ctx.lineWidth = 1.4 * devicePixelRatio;
-      ctx.setLineDash(dash.map((length) => length * devicePixelRatio));
-      ctx.beginPath();
-      ctx.moveTo(x0, y0);
-      ctx.lineTo(x1, y1);
-      ctx.stroke();
-      ctx.restore();
-    };
+  /** The limit. */
+  private overlay({ ctx, bbox, valToPos }: uPlot): void {
     const limit = this.plot.limit?.(this.flights[0]!);
-    if (limit !== undefined) {
-      const y = chart.valToPos(limit, "y", true);
-      if (y > bbox.top && y < bbox.top + bbox.height) rule(bbox.left, y, bbox.left + bbox.width, y, palette.warn, [5, 4]);
-    }
-    const x = chart.valToPos(this.clock.time, "x", true);
-    if (x >= bbox.left - 1 && x <= bbox.left + bbox.width + 1) rule(x, bbox.top, x, bbox.top + bbox.height, palette.ink, []);
+    const y = limit === undefined ? NaN : valToPos(limit, "y", true);
+    if (!(y > bbox.top && y < bbox.top + bbox.height)) return;
+    ctx.save();
+    ctx.strokeStyle = theme.palette.warn;
+    ctx.lineWidth = 1.4 * devicePixelRatio;
+    ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
+    ctx.beginPath();
+    ctx.moveTo(bbox.left, y);
+    ctx.lineTo(bbox.left + bbox.width, y);
+    ctx.stroke();
+    ctx.restore();
   }
 
   private header(): void {
