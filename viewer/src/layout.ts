@@ -173,7 +173,7 @@ export class Cockpit {
     const several = this.flights.length > 1;
     const title = several ? [el("div", { class: `title ${flight.info.level}` }, el("b", {}, flight.info.label), el("span", {}, flight.info.verdict))] : [];
     const full = `${Number(flight.full.toPrecision(2))} N or more`;
-    const scale = el("div", { class: "tension-scale" }, el("span", {}, "slack"), el("i"), el("span", {}, full));
+    const scale = el("div", {}, el("dt", {}, "cables"), el("dd", { class: "tension-scale" }, "slack", el("i"), full));
     return el(
       "section",
       { class: "scene", "aria-label": flight.info.label },
@@ -182,9 +182,8 @@ export class Cockpit {
         "div",
         { class: "overlay" },
         ...title,
-        el("dl", { class: "hud" }, ...cells.map((cell) => el("div", {}, el("dt", {}, cell.name), el("dd", {}, cell.out)))),
+        el("dl", { class: "hud" }, ...cells.map((cell) => el("div", {}, el("dt", {}, cell.name), el("dd", {}, cell.out))), scale),
       ),
-      scale,
     );
   }
 

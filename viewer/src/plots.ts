@@ -232,7 +232,7 @@ class Chart {
         scales: { x: { time: false }, y: this.scale() },
         axes: [
           { stroke: palette.soft, grid, ticks, font: FONT, size: 22, gap: 4, values: (_chart, splits) => splits.map((t) => `${t}`) },
-          { stroke: palette.soft, grid, ticks, font: FONT, size: 42, gap: 6, space: 28 },
+          { stroke: palette.soft, grid, ticks, font: FONT, size: 42, gap: 6, space: 28, values: (_chart, splits) => splits.map(short) },
         ],
         series: [
           {},
@@ -332,6 +332,12 @@ export function plots(flights: Flight[], clock: Clock, window = Infinity): Part 
   const charts = PLOTS.map((plot) => new Chart(plot, flights, clock, window));
   const element = el("div", { class: "plots" }, ...charts.map((chart) => chart.element));
   return { element, update: () => charts.forEach((chart) => chart.update()) };
+}
+
+/** A number at an axis; none where the axis wants none. */
+function short(value: number | null): string | null {
+  if (value === null) return null;
+  return Math.abs(value) >= 1000 ? `${value / 1000}k` : `${Number(value.toPrecision(6))}`;
 }
 
 const gap = (value: number): number | null => (Number.isFinite(value) ? value : null);

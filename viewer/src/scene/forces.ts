@@ -7,6 +7,9 @@ import type { Maker } from "./element";
 const UP = new Vector3(0, 0, 1);
 const NONE = new Matrix4().makeScale(0, 0, 0);
 
+/** Longest arrow, in lengths of a cable: a spike must not hide the flight. */
+const LONGEST = 1.2;
+
 /** Arrows of one colour. */
 class Arrows {
   readonly object = new Group();
@@ -18,7 +21,11 @@ class Arrows {
   private readonly size = new Vector3();
   private readonly tip = new Vector3();
 
-  constructor(count: number, private readonly radius: number) {
+  constructor(
+    count: number,
+    private readonly radius: number,
+    private readonly longest: number,
+  ) {
     const shaft = new CylinderGeometry(1, 1, 1, 8).rotateX(Math.PI / 2).translate(0, 0, 0.5);
     const head = new ConeGeometry(1, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5);
     this.shafts = new InstancedMesh(shaft, this.material, count);
@@ -30,7 +37,7 @@ class Arrows {
   }
 
   set(i: number, from: Vector3, vector: Vector3): void {
-    const length = vector.length();
+    const length = vector.clampLength(0, this.longest).length();
     const shown = Number.isFinite(length + from.x) && length > 4 * this.radius;
     if (shown) {
       const head = Math.min(5 * this.radius, 0.5 * length);
@@ -51,9 +58,10 @@ class Arrows {
 export const forces: Maker = (flight, { drone }) => {
   const object = new Group();
   const radius = 0.05 * drone;
-  const wanted = new Arrows(1, 1.3 * radius);
-  const pushed = new Arrows(1, 1.3 * radius);
-  const thrusts = new Arrows(flight.n, radius);
+  const cable = flight.info.cable_lengths[0]!;
+  const wanted = new Arrows(1, 1.3 * radius, LONGEST * cable);
+  const pushed = new Arrows(1, 1.3 * radius, LONGEST * cable);
+  const thrusts = new Arrows(flight.n, radius, LONGEST * cable);
   object.add(wanted.object, pushed.object, thrusts.object);
 
   const from = new Vector3();
@@ -71,14 +79,13 @@ export const forces: Maker = (flight, { drone }) => {
     update(frame, shown) {
       object.visible = shown.forces;
       if (!shown.forces) return;
-      const length = flight.info.cable_lengths[0]!;
-      const unit = (0.5 * length) / Math.max(flight.info.weight, 1e-6);
+      const unit = (0.5 * cable) / Math.max(flight.info.weight, 1e-6);
       on(wanted, frame.force, frame, unit);
       on(pushed, frame.external, frame, unit);
       for (let i = 0; i < frame.n; i++) {
         const [w, x, y, z] = frame.attitudes.subarray(4 * i, 4 * i + 4);
         attitude.set(x!, y!, z!, w!);
-        const thrust = (0.45 * length * frame.thrusts[i]!) / Math.max(flight.info.thrust, 1e-6);
+        const thrust = (0.45 * cable * frame.thrusts[i]!) / Math.max(flight.info.thrust, 1e-6);
         thrusts.set(i, from.fromArray(frame.positions, 3 * i), vector.set(0, 0, thrust).applyQuaternion(attitude));
       }
     },
