@@ -77,8 +77,15 @@ def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
             temporary.write_text(text, encoding="utf-8")
     if report:
         from colift.report.html import write_report
+        from colift.viewer.data import payload
+        from colift.viewer.page import write_page
 
-        files["report"] = write_report(flown.recording, folder, metrics=flown.metrics)
+        label = flown.mission.kinds["allocation"]
+        data = payload([flown.recording], [flown.metrics], [label])
+        files["replay"] = write_page(folder / "replay.html", data)
+        files["report"] = write_report(
+            flown.recording, folder, metrics=flown.metrics, replay=files["replay"]
+        )
     return files
 
 

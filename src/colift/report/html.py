@@ -1,4 +1,7 @@
-"""Pages of one file: no script, no request, dark and light, wide and narrow."""
+"""Pages of one file: no script, no request, dark and light, wide and narrow.
+
+The page of a flight may show a replay, which is a page of its own beside it.
+"""
 
 from __future__ import annotations
 
@@ -50,6 +53,8 @@ code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,"DejaVu Sans Mono",mon
 td code{color:var(--soft)}
 figure{margin:0 0 2.2rem}
 figure .scroll{background:#fff;border:1px solid var(--rule);border-radius:.4rem;padding:.5rem}
+iframe{display:block;width:100%;aspect-ratio:16/10;min-height:30rem;border:1px solid var(--rule);
+border-radius:.4rem}
 figure svg,figure img{display:block;width:100%;height:auto;min-width:30rem}
 figcaption{font-size:.9rem;margin-top:.5rem}
 figcaption b{color:var(--ink)}
@@ -111,13 +116,28 @@ def figure(drawing: Drawing) -> str:
     )
 
 
+def frame(file: str) -> str:
+    """The replay in a frame that runs its scripts and may do nothing else, and a link to it alone."""
+    name = escape(file)
+    return (
+        f'<h2>Replay</h2>\n<iframe src="{name}" title="Replay in 3D" loading="lazy" '
+        'sandbox="allow-scripts"></iframe>\n'
+        f'<p class="soft">The frame shows <a href="{name}">{name}</a>, which must stand beside '
+        "this page.</p>"
+    )
+
+
 def details(summary: str, text: str) -> str:
     """Preformatted text that opens on demand."""
     return f"<details><summary>{escape(summary)}</summary><pre>{escape(text)}</pre></details>"
 
 
 def write_report(
-    source: Run | Recording, folder: str | Path, *, metrics: Mapping[str, float]
+    source: Run | Recording,
+    folder: str | Path,
+    *,
+    metrics: Mapping[str, float],
+    replay: Path | None = None,
 ) -> Path:
     """Write ``report.html`` and ``figures/<name>.png`` and ``.svg`` of one flight.
 
@@ -129,11 +149,13 @@ def write_report(
         Created if missing; files of the same name are replaced, each only by a whole one.
     metrics : mapping
         As from :func:`colift.metrics.compute`.
+    replay : path, optional
+        Page of the viewer in the same folder, shown in a frame.
 
     Returns
     -------
     Path
-        The page; it needs none of the other files. Equal recordings give equal bytes.
+        The page; it needs no other file but ``replay``. Equal recordings give equal bytes.
 
     """
     from colift.report.figures import drawable
@@ -146,12 +168,18 @@ def write_report(
         drawing.save(folder / "figures")
     target = folder / "report.html"
     with atomic_path(target) as temporary:
-        temporary.write_text(report(recording, metrics, drawings), encoding="utf-8", newline="\n")
+        text = report(recording, metrics, drawings, replay.name if replay else None)
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequence[Drawing]) -> str:
-    """The page of one flight."""
+def report(
+    recording: Recording,
+    metrics: Mapping[str, float],
+    drawings: Sequence[Drawing],
+    replay: str | None = None,
+) -> str:
+    """The page of one flight; ``replay`` is the file beside it that replays the flight."""
     mission = recording.mission
     versions = "\n".join(f"{name:9} {text}" for name, text in recording.versions.items())
     parts = [
@@ -170,6 +198,7 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
         criteria_table(judge(recording, metrics)),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
+        frame(replay) if replay else "",
         "<h2>Figures</h2>",
         *map(figure, drawings),
         "<h2>Provenance</h2>",
