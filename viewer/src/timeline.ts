@@ -5,8 +5,8 @@ import type { Flight } from "./data";
 import { button, el, icon, ICONS } from "./dom";
 import { KINDS, type Mark } from "./events";
 
-/** Least distance of two marks, per cent of the track. */
-const NUDGE = 1.1;
+/** Width of a mark, and so the least distance of two, px. */
+const MARK = 18;
 
 export class Timeline {
   readonly element: HTMLElement;
@@ -102,7 +102,8 @@ export class Timeline {
 
   private drawMarks(): void {
     const { start, end } = this.clock;
-    const state = `${start} ${end} ${this.flights.map((flight) => flight.events.length).join()}`;
+    const width = this.marks.clientWidth || 1;
+    const state = `${width} ${start} ${end} ${this.flights.map((flight) => flight.events.length).join()}`;
     if (state === this.drawn) return;
     this.drawn = state;
     this.marks.replaceChildren();
@@ -110,7 +111,7 @@ export class Timeline {
       let taken = -Infinity;
       for (const mark of flight.events) {
         // Marks of about the same time stand beside each other.
-        const place = Math.max(this.part(mark.time), taken + NUDGE);
+        const place = Math.min(Math.max(this.part(mark.time), taken + (100 * MARK) / width), 100);
         taken = place;
         this.marks.append(this.mark(mark, flight, lane, place));
       }
