@@ -90,8 +90,8 @@ def _flight(
         * mission.world.gravity
         / recording.n,
         "facts": {
-            "allocator": mission.kinds["allocation"],
-            "reference": mission.kinds["reference"],
+            "allocator": mission.kinds.get("allocation", "on board"),
+            "reference": mission.kinds.get("reference", "recorded"),
             "drones": f"{recording.n}",
             "load": f"{mission.load.mass:g} kg",
             "seed": f"{mission.seed}",
@@ -204,7 +204,7 @@ def load_payload(paths: Sequence[Path]) -> dict[str, Any]:
 
     """
     recordings = [Recording.load(path) for path in paths]
-    labels = [recording.mission.kinds["allocation"] for recording in recordings]
+    labels = [recording.mission.kinds.get("allocation", "on board") for recording in recordings]
     if len(set(labels)) < len(labels):
         labels = [path.stem if path.stem != "recording" else path.parent.name for path in paths]
     return payload(recordings, [compute(recording) for recording in recordings], labels)
