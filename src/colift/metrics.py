@@ -123,8 +123,9 @@ def _smallest_angle(directions: NDArray[np.float64]) -> float:
     # In slices: pairs grow as n^2, and memory should not.
     rows = max(1, 2_000_000 // directions.shape[1] ** 2)
     parts = range(0, len(directions), rows)
-    smallest = [np.nanmin(pairwise_angles(directions[k : k + rows])) for k in parts]
-    return float(np.degrees(min(smallest)))
+    angles = (pairwise_angles(directions[k : k + rows]) for k in parts)
+    smallest = [float(part[~np.isnan(part)].min()) for part in angles if not np.isnan(part).all()]
+    return math.degrees(min(smallest, default=math.nan))
 
 
 @_metric("m", "root mean square of the load's distance from its reference")
@@ -139,7 +140,8 @@ def tracking_max_m(r: Recording) -> float:
 
 @_metric("deg", "smallest angle between two actual cables at any time")
 def min_angle_deg(r: Recording) -> float:
-    return _smallest_angle(r["directions"])
+    held = r["attached"] > 0.0  # a cable that is cut makes no angle
+    return _smallest_angle(np.where(held[..., None], r["directions"], np.nan))
 
 
 @_metric("deg", "smallest angle between two wanted cables at any time")
@@ -189,6 +191,28 @@ def tension_imbalance(r: Recording) -> float:
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
     return float(np.nanmax(r["slack_times"], axis=0).sum())
+
+
+@_metric("m", "least height of the load")
+def min_height_m(r: Recording) -> float:
+    return float(r["load"][:, 0, 2].min())
+
+
+@_metric("1", "drones that left before the end")
+def lost_drones(r: Recording) -> float:
+    flying = ~np.isnan(r["attached"])
+    return float(np.count_nonzero(flying.any(axis=0) & ~flying[-1]))
+
+
+@_metric("s", "longest time from a cut cable or dead motors to the drone's leaving the team")
+def detection_delay_s(r: Recording) -> float:
+    broken = (r["attached"] == 0.0) | (r["motor_health"].max(axis=2) == 0.0)
+    delays = []
+    for drone in np.flatnonzero(broken.any(axis=0)):
+        since = int(np.argmax(broken[:, drone]))
+        gone = np.flatnonzero(np.isnan(r["attached"][since:, drone]))
+        delays.append(r.time[since + gone[0]] - r.time[since] if gone.size else math.inf)
+    return float(max(delays, default=math.nan))
 
 
 @_metric("1", "allocations that failed: not the best answer, and no limit to blame")
