@@ -26,6 +26,7 @@ def mission(world, fault=None, n=4, seed=0, duration=5.0, **overrides):
     table["drones"]["count"], table["seed"], table["timing"]["duration"] = n, seed, duration
     if world == "ideal":
         table["disturbance"] = []
+        table["detection"]["frozen"] = 0.0
         for layer in ("sensing", "link", "actuation"):
             table[layer] = {"kind": "ideal"}
     return load_mission(table, {path.replace("__", "."): v for path, v in overrides.items()})
@@ -174,9 +175,13 @@ def test_stuck_sensors_of_the_load_are_nobodys_loss():
 
 
 def test_a_drone_whose_sensors_stay_stuck_is_dropped():
-    flight, r = fly("real", {"kind": "sensor-stuck", "duration": 5.0}, duration=AT + 2.0)
-    assert [drone for _, drone in flight.found] == [1]
-    assert r.outcome == "completed"
+    for frozen in (0.0, 0.06):
+        fault = {"kind": "sensor-stuck", "duration": 5.0}
+        flight, r = fly("real", fault, duration=AT + 2.0, detection__frozen=frozen)
+        assert [drone for _, drone in flight.found] == [1]
+        assert r.outcome == "completed"
+    assert flight.found[0][0] - AT == pytest.approx(0.06, abs=0.012)
+    assert error(r).max() < 0.1
 
 
 def test_two_faults_one_after_the_other():
@@ -198,7 +203,7 @@ def test_thresholds_are_settings():
                                  {"detection.speed": 10.0}))  # fmt: skip
     flight.run()
     assert flight.found == []
-    assert Residuals().params(colift.team.Team.uniform(3)).size == 10
+    assert Residuals().params(colift.team.Team.uniform(3)).size == 11
 
 
 # ---------------------------------------------------------------- controlled descent
