@@ -138,7 +138,7 @@ def test_lost_drones_are_found_and_the_others_carry_on(world, fault):
 
 
 def test_no_false_alarm_without_a_fault():
-    """Twelve seeds of noise, delay, loss, motors, wind of 10 m/s and severe turbulence."""
+    """Twelve seeds of noise, delay, loss, motors, wind of 10 m/s and its turbulence."""
     worst = 0.0
     for seed in range(12):
         wind = {"disturbance.0.speed": 10.0, "disturbance.1.speed": 10.0}
