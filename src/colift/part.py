@@ -12,7 +12,7 @@ import importlib.metadata
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -99,6 +99,10 @@ class Part(BaseModel):
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""
         return []
 
+    def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
+        """Problems with the physics step or the length of the flight (s), as for :meth:`check`."""
+        return []
+
 
 def carry_rows(old: Vector, fresh: Vector, head: int, width: int, places: Places) -> Vector:
     """Copy ``head`` values and then the ``width`` values of every drone that stays into ``fresh``."""
@@ -108,6 +112,23 @@ def carry_rows(old: Vector, fresh: Vector, head: int, width: int, places: Places
             begin = head + width * place
             fresh[head + width * new : head + width * (new + 1)] = old[begin : begin + width]
     return fresh
+
+
+def timing_problems(
+    step: float, duration: float, periods: Mapping[str, float], delays: Mapping[str, float]
+) -> list[tuple[str, str]]:
+    """Periods that are no whole multiple of the physics step, and delays longer than the flight, by field."""
+    found = []
+    for field, period in periods.items():
+        count = round(period / step)
+        if count < 1 or abs(count * step - period) > 1e-9 * period:
+            message = f"must be a whole multiple of timing.step = {step:g} s, not {period:g}"
+            found.append((field, f"{message}; nearest {max(1, count) * step:g}"))
+    for field, delay in delays.items():
+        if delay >= duration:
+            message = f"must be shorter than timing.duration = {duration:g} s, not {delay:g}"
+            found.append((field, message))
+    return found
 
 
 _registered: dict[tuple[str, str], type[Part]] = {}

@@ -15,6 +15,7 @@ from colift import jit, part
 from colift.allocation import base as allocation
 from colift.disturbance import base as disturbance
 from colift.errors import ColiftError, UnknownNameError
+from colift.fault.base import LOAD
 from colift.mission import load_mission
 from colift.plant.base import Start
 from colift.simulation.flight import Flight
@@ -145,7 +146,7 @@ class TestEveryFault:
         assert len({str(each) for each in resolved}) > 1
         for change in (change for each in resolved for change in each):
             assert change.signal in CONDITIONS
-            assert change.drone is None or 0 <= change.drone < n
+            assert change.drone in (None, LOAD) or 0 <= change.drone < n
             assert change.at >= 0.0
         fixed = part.find("fault", name)(at=2.0, drone=3).resolve(np.random.default_rng(0), n, 8.0)
         assert min(change.at for change in fixed) == 2.0

@@ -80,6 +80,10 @@ class AllocatorPart(Part):
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""
         return float("nan")
 
+    def cannot_hold(self, team: Team) -> list[str]:
+        """Why its limits do not let the team hold the load in hover; empty when they do, or without limits."""
+        return []
+
 
 class Allocation:
     """One answer of an allocator.

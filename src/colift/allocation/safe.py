@@ -302,6 +302,9 @@ class Safe(AllocatorPart):
                 )
         return problems + feasible.conflicts_of(team, self)
 
+    def cannot_hold(self, team: Team) -> list[str]:
+        return list(feasible.feasibility(team, self).conflicts)
+
     def of(self, drones: Sequence[int]) -> Self:
         lists = {
             name: [value[drone] for drone in drones]

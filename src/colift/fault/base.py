@@ -13,11 +13,15 @@ from pydantic import Field
 
 from colift.part import Part
 
+LOAD = -1
+"""In place of a drone: the load, in signals that have a row for it."""
+
 
 class Change(NamedTuple):
     """``signal[drone] = value`` at a time (s); without a drone the whole signal.
 
-    ``signal`` is one of those of :data:`colift.simulation.signals.CONDITIONS`.
+    ``signal`` is one of those of :data:`colift.simulation.signals.CONDITIONS`. In a value with several
+    numbers, None leaves the one in its place as it is.
     """
 
     at: float

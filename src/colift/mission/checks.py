@@ -58,6 +58,10 @@ def cross_checks(
             team = frame.true_team if part.layer == "plant" else frame.team
             for field, message in part.check(team):
                 yield Problem(f"{path}.{field}", "", message)
+    if "timing" not in broken:
+        for path, part in _with_paths(parts, lists):
+            for field, message in part.check_timing(timing.step, timing.duration):
+                yield Problem(f"{path}.{field}", "", message)
     if len(lists["disturbance"]) > MAX_DISTURBANCES:
         message = f"must be at most {MAX_DISTURBANCES}"
         yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)

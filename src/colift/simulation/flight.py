@@ -11,15 +11,16 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.allocation.base import INFO_SIZE
+from colift.allocation.base import INFO_SIZE, AllocatorPart
 from colift.disturbance.base import DisturbancePart
 from colift.errors import ColiftError
-from colift.fault.base import Change
+from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.mission.schema import Event, Mission
 from colift.part import LAYERS, Part, Vector, find
 from colift.plant.base import Start
 from colift.recording import Recording
+from colift.reference.descent import Descent
 from colift.simulation.loop import (
     CYCLE_WIDTH,
     Disturbances,
@@ -57,6 +58,8 @@ class Flight:
         ``"completed"``, or how the flight ended.
     found : list of (time, drone)
         Drones that were judged lost by the mission's ``detection``, s.
+    descent : str
+        Why the load is brought down because the drones left cannot carry it; empty while they can.
 
     """
 
@@ -65,6 +68,7 @@ class Flight:
         self.loop_time = 0.0
         self.outcome = "completed"
         self.found: list[tuple[float, int]] = []
+        self.descent = ""
         self._step = 0
         self._every = Periods(mission.timing.step, **mission.timing.multiples())
         self._keys = Keys(*(random_key(mission.seed, layer) for layer in Keys._fields))
@@ -153,6 +157,8 @@ class Flight:
             self._disturbances[int(number)] = disturbance
         elif section in self._parts and section != "plant":
             part = _with(self._parts[section], name, value)
+            if part.memory(leg.team).shape != getattr(leg.memory, section).shape:
+                raise ColiftError(f"{path}: cannot change in flight")
             _refill(getattr(leg.params, section), part.of(leg.drones).params(leg.team), path)
             self._parts[section] = part
         else:
@@ -222,7 +228,7 @@ class Flight:
             time=np.arange(rows, dtype=np.float64) * (every.recording * every.step),
             cycle_time=np.arange(len(cycles), dtype=np.float64) * (every.allocation * every.step),
             arrays=arrays,
-            outcome=self.outcome,
+            outcome=(self.descent or self.outcome) if self.outcome == "completed" else self.outcome,
         )
 
     def _fly_to(self, stop: int) -> None:
@@ -237,11 +243,30 @@ class Flight:
             elif not leg.bus.carrying.all():
                 lost = [d for d, ok in zip(leg.drones, leg.bus.carrying, strict=True) if not ok]
                 self.found += [(self.time, drone) for drone in lost]
-                rest = [drone for drone in leg.drones if drone not in lost]
-                if rest:
-                    self.regroup(rest)
+                if len(lost) < len(leg.drones):
+                    self._lose(lost)
                 else:
                     self.outcome = f"no drone left to carry at t = {self.time:g} s"
+
+    def _lose(self, lost: list[int]) -> None:
+        """Go on without these drones; if the others cannot hold the load in hover, bring it down."""
+        rest = [drone for drone in self.drones if drone not in lost]
+        if not self.descent and (reason := self._cannot_carry(rest)):
+            self.descent = f"descended from t = {self.time:g} s: {reason}"
+            position, velocity = self.bus.reference[:2].tolist()
+            self._parts["reference"] = Descent(position=position, velocity=velocity, at=self.time)
+        self.regroup(rest)
+
+    def _cannot_carry(self, drones: list[int]) -> str:
+        """Why these drones cannot carry the load on; empty when they can, as far as their models say."""
+        team = self.mission.team.of(drones)
+        actuation, allocation = (
+            self._parts[layer].of(drones) for layer in ("actuation", "allocation")
+        )
+        problems = [message for _, message in actuation.check(team)]
+        if isinstance(allocation, AllocatorPart):
+            problems += allocation.cannot_hold(team)
+        return "; ".join(problems)
 
     def _advance(self, stop: int) -> None:
         """Run the loop up to a step, or until it ends early; keep what it recorded."""
@@ -264,13 +289,18 @@ class Flight:
         drones = self.drones
         if isinstance(due, Change):
             signal = getattr(self.bus, due.signal)
-            if due.drone is None:
-                signal[...] = due.value
+            value = np.array(due.value, dtype=np.float64)  # None becomes NaN
+            if due.drone == LOAD:
+                signal = signal[-1:]
             elif due.drone in drones:
-                signal[drones.index(due.drone)] = due.value
+                place = drones.index(due.drone)
+                signal = signal[place : place + 1]
+            elif due.drone is not None:
+                return
+            np.copyto(signal, value, where=~np.isnan(value))
         elif due.field == "drones.lose":
             if due.value in drones and len(drones) > 1:
-                self.regroup([drone for drone in drones if drone != due.value])
+                self._lose([due.value])
         elif due.field == "drones.join":
             self.regroup(sorted([*drones, due.value]))
         else:

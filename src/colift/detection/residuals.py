@@ -1,0 +1,137 @@
+"""Lost drones from residuals: a cable that lengthens, a thrust that is not there, numbers that stand still."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.detection.base import SIGNATURE, DetectionPart
+from colift.jit import kernel
+from colift.math import quaternion
+from colift.part import Places, Vector, carry_rows
+from colift.team import Team
+
+# Parameters before the masses: filter, hold, speed, length, time to learn it, deficit, frozen, gravity.
+_HEAD = 8
+_SLOTS = 24
+_LENGTH, _DISTANCE, _SPEED, _V, _P, _CABLE, _THRUST = 1, 2, 3, 4, 7, 10, 11
+_STILL, _LAST = 12, 13  # time without any change; position, velocity, attitude
+_NOW = 23  # whether the distance changes faster than that of a taut cable
+
+
+@kernel(SIGNATURE)
+def _judge(  # type: ignore[no-untyped-def]
+    dt, load, positions, velocities, attitudes, thrusts, tensions, directions, params, memory,
+    carrying,
+):  # fmt: skip
+    n = positions.shape[0]
+    tau, hold, fast, longer = params[0], params[1], params[2], params[3]
+    learn, deficit, frozen, g = params[4], params[5], params[6], params[7]
+    keep = math.exp(-dt / tau)
+    moving = 0.0
+    for i in range(n):
+        o = _SLOTS * i
+        m = params[_HEAD + i]
+        x, y, z = (
+            load[0, 0] - positions[i, 0], load[0, 1] - positions[i, 1], load[0, 2] - positions[i, 2]
+        )  # fmt: skip
+        d = max(math.sqrt(x * x + y * y + z * z), 1e-9)
+        alpha = (x / d, y / d, z / d)
+        axis = quaternion.third_axis(
+            attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
+        )
+        if memory[o] == 0.0:
+            memory[o] = 1.0
+            memory[o + _LENGTH] = memory[o + _DISTANCE] = d
+            for k in range(3):
+                memory[o + _V + k] = velocities[i, k]
+        speed = lacking = 0.0
+        for k in range(3):
+            speed += alpha[k] * (load[1, k] - velocities[i, k])
+            expected = (thrusts[i] * axis[k] + tensions[i] * alpha[k]) / m
+            if k == 2:
+                expected -= g
+            # Both through the same filter: (v - filtered v) / tau is the filtered acceleration.
+            memory[o + _P + k] = keep * memory[o + _P + k] + (1.0 - keep) * expected
+            memory[o + _V + k] = keep * memory[o + _V + k] + (1.0 - keep) * velocities[i, k]
+            observed = (velocities[i, k] - memory[o + _V + k]) * (1.0 - keep) / (keep * dt)
+            lacking += axis[k] * (memory[o + _P + k] - observed)
+        memory[o + _SPEED] = keep * memory[o + _SPEED] + (1.0 - keep) * speed
+        memory[o + _DISTANCE] = keep * memory[o + _DISTANCE] + (1.0 - keep) * d
+
+        # A taut cable keeps its length, which is learned while it does.
+        changing = abs(memory[o + _SPEED]) > fast
+        memory[o + _NOW] = 1.0 if changing else 0.0
+        moving += memory[o + _NOW]
+        stretch = memory[o + _DISTANCE] - memory[o + _LENGTH]
+        if abs(memory[o + _SPEED]) < 0.5 * fast:
+            memory[o + _LENGTH] += (1.0 - math.exp(-dt / learn)) * stretch
+        apart = changing and memory[o + _SPEED] > 0.0 and stretch > longer
+        memory[o + _CABLE] = memory[o + _CABLE] + dt if apart else 0.0
+        weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
+        memory[o + _THRUST] = memory[o + _THRUST] + dt if weak else 0.0
+
+        still = True
+        for k in range(10):
+            if k < 3:
+                value = positions[i, k]
+            elif k < 6:
+                value = velocities[i, k - 3]
+            else:
+                value = attitudes[i, k - 6]
+            still = still and value == memory[o + _LAST + k]
+            memory[o + _LAST + k] = value
+        memory[o + _STILL] = memory[o + _STILL] + dt if still else 0.0
+    for i in range(n):
+        o = _SLOTS * i
+        # If most distances change, it is the load that is seen wrongly, or let go.
+        if memory[o + _CABLE] >= hold and (n == 1 or 2.0 * moving <= n):
+            carrying[i] = 0.0
+        if memory[o + _THRUST] >= hold or 0.0 < frozen <= memory[o + _STILL]:
+            carrying[i] = 0.0
+
+
+class Residuals(DetectionPart):
+    """A cable is gone when its ends move apart; a drone is gone when its acceleration lacks its thrust.
+
+    First: the distance between drone and load is constant while the cable is taut, whatever the wind and the
+    masses. It grows beyond the learned length, at some speed, when the cable is cut. If that of more than half of
+    the team changes, the load's sensors are suspected instead and no cable is.
+
+    Second: along its thrust, a drone's filtered acceleration is compared with what commanded thrust, wanted
+    tension and weight would give (a momentum observer; De Luca and Mattone, ICRA 2005). Wind is part of the
+    difference, so the deficit must be large.
+
+    Third, where asked for: a drone of which no number changes for a while is not measured any more. Noise never
+    repeats itself, but perfect sensors of a drone in balance may.
+    """
+
+    kernel = _judge
+
+    filter: Annotated[float, Field(ge=0.002, le=1.0)] = 0.03
+    """Time constant of the filters, s."""
+    hold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
+    """Time for which a sign must last, s."""
+    speed: Annotated[float, Field(gt=0.0, le=10.0)] = 0.12
+    """Speed at which the ends of a cable move apart, m/s."""
+    length: Annotated[float, Field(ge=0.0, le=10.0)] = 0.004
+    """Length by which they do, m."""
+    learning: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
+    """Time constant with which the cables' lengths are learned, s."""
+    deficit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    """Share of the commanded thrust that lacks."""
+    frozen: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    """Time for which nothing that is known of a drone changes, s; 0: not looked at."""
+
+    def params(self, team: Team) -> Vector:
+        head = [self.filter, self.hold, self.speed, self.length, self.learning, self.deficit]
+        return np.array([*head, self.frozen, team.gravity, *team.masses])
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(_SLOTS * team.n)
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        return carry_rows(old, fresh, 0, _SLOTS, places)

@@ -1,0 +1,37 @@
+"""Bodies in the air outside of any loop, for the tests of this folder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colift.team import Team
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+class Air:
+    """n drones and a load for one disturbance; :meth:`act` gives wind and forces of one step."""
+
+    def __init__(self, part, n=1, *, key=7, dt=0.001):
+        self.part, self.n, self.key, self.dt = part, n, key, dt
+        self.params, self.memory = part.params(Team.uniform(n)), part.memory(Team.uniform(n))
+        self.load = np.zeros((2, 3))
+        self.positions = np.tile([0.0, 0.0, 1.0], (n, 1))
+        self.velocities, self.attitudes = np.zeros((n, 3)), np.tile(UPRIGHT, (n, 1))
+        self.directions, self.direction_rates = np.tile(DOWN, (n, 1)), np.zeros((n, 3))
+        self.thrusts, self.attached = np.zeros(n), np.ones(n)
+
+    def stretch(self):
+        """Set the directions from the positions."""
+        between = self.load[0] - self.positions
+        self.directions[:] = between / np.linalg.norm(between, axis=1, keepdims=True)
+
+    def act(self, step=0, wind=(0.0, 0.0, 0.0)):
+        air, forces = np.array(wind, dtype=float), np.zeros((self.n + 1, 3))
+        type(self.part).kernel(
+            step, self.key, self.dt, self.load, self.positions, self.velocities, self.attitudes,
+            self.directions, self.direction_rates, self.thrusts, self.attached, self.params,
+            self.memory, air, forces,
+        )  # fmt: skip
+        return air, forces
