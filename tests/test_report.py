@@ -20,9 +20,12 @@ from colift.report import comparison, figures, html, panels, render, style
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:
     """Two seconds of a mission at the coarse recording rate that figures need."""
-    events = load_mission(mission).events
-    early = [event.model_dump() | {"at": 1.0 + 0.1 * k} for k, event in enumerate(events)]
-    overrides = {"timing.duration": 2.0, "events": early, **settings}
+    loaded = load_mission(mission).resolved()
+    early = {
+        name: [item | {"at": 1.0 + 0.1 * k} for k, item in enumerate(loaded[name])]
+        for name in ("events", "fault")
+    }
+    overrides = {"timing.duration": 2.0, **early, **settings}
     return colift.run(mission, overrides=overrides).recording
 
 

@@ -55,5 +55,9 @@ class FlightDataError(ColiftError):
     """A log of a real flight cannot be read; the message names the file and the place in it."""
 
 
+class BrowserError(ColiftError):
+    """No browser was found to draw in, or it could not draw."""
+
+
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""

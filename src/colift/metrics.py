@@ -148,14 +148,31 @@ def _total(recording: Recording) -> NDArray[np.float64]:
     return np.asarray(np.nansum(np.abs(recording["tensions"]), axis=1))
 
 
-def _smallest_angle(directions: NDArray[np.float64]) -> float:
+def _smallest_of_rows(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least number of each row; NaN for a row of which none is known."""
+    least = np.min(np.where(np.isnan(values), np.inf, values), axis=1)
+    return np.where(np.isinf(least), np.nan, least)
+
+
+def _smallest_angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smallest angle of any pair in each row, degrees; NaN for a single cable."""
     if directions.shape[1] < 2:
-        return float("nan")
+        return np.full(len(directions), np.nan)
     # In slices: pairs grow as n^2, and memory should not.
     rows = max(1, 2_000_000 // directions.shape[1] ** 2)
     parts = range(0, len(directions), rows)
-    largest = [_largest(-pairwise_angles(directions[k : k + rows])) for k in parts]
-    return -float(np.degrees(_largest(np.array(largest))))
+    smallest = [_smallest_of_rows(pairwise_angles(directions[k : k + rows])) for k in parts]
+    return np.asarray(np.degrees(np.concatenate(smallest)))
+
+
+def _uncut(recording: Recording) -> NDArray[np.float64]:
+    """Actual directions; NaN for a cable that is cut, which makes no angle."""
+    cut = recording["attached"] == 0.0
+    return np.where(cut[..., None], np.nan, recording["directions"])
+
+
+def _smallest_angle(directions: NDArray[np.float64]) -> float:
+    return -_largest(-_smallest_angles(directions))
 
 
 @_metric("m", "root mean square of the load's distance from its reference")
@@ -170,7 +187,14 @@ def tracking_max_m(r: Recording) -> float:
 
 @_metric("deg", "smallest angle between two actual cables at any time")
 def min_angle_deg(r: Recording) -> float:
-    return _smallest_angle(r["directions"])
+    return _smallest_angle(_uncut(r))
+
+
+@_metric("deg", "median over time of the smallest angle between two actual cables")
+def usual_angle_deg(r: Recording) -> float:
+    known = _smallest_angles(_uncut(r))
+    known = known[~np.isnan(known)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 @_metric("deg", "smallest angle between two wanted cables at any time")
@@ -219,9 +243,37 @@ def tension_imbalance(r: Recording) -> float:
     return float(means.max() / means.min()) if means.min() > 0 else float("inf")
 
 
+@_metric("1", "largest over mean power of the drones in flight, power taken as thrust^(3/2)")
+def energy_imbalance(r: Recording) -> float:
+    power = mean(np.maximum(r["thrusts"], 0.0) ** 1.5, r.time, axis=0)  # a rotor's induced power
+    return _largest(power) / float(power.mean()) if power.mean() > 0 else float("nan")
+
+
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
     return float(sum(_largest(times) for times in r["slack_times"].T))
+
+
+@_metric("m", "least height of the load")
+def min_height_m(r: Recording) -> float:
+    return float(r["load"][:, 0, 2].min())
+
+
+@_metric("1", "drones that left before the end")
+def lost_drones(r: Recording) -> float:
+    flying = ~np.isnan(r["attached"])
+    return float(np.count_nonzero(flying.any(axis=0) & ~flying[-1]))
+
+
+@_metric("s", "longest time from a cut cable or dead motors to the drone's leaving the team")
+def detection_delay_s(r: Recording) -> float:
+    broken = (r["attached"] == 0.0) | (r["motor_health"].max(axis=2) == 0.0)
+    delays = []
+    for drone in np.flatnonzero(broken.any(axis=0)):
+        since = int(np.argmax(broken[:, drone]))
+        gone = np.flatnonzero(np.isnan(r["attached"][since:, drone]))
+        delays.append(r.time[since + gone[0]] - r.time[since] if gone.size else math.inf)
+    return float(max(delays, default=math.nan))
 
 
 @_metric("1", "allocations that failed: not the best answer, and no limit to blame")

@@ -13,6 +13,7 @@ import importlib.util
 import pkgutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -174,9 +175,14 @@ def names(layer: str) -> list[str]:
         for module in pkgutil.iter_modules(folder.__path__)
         if not module.name.startswith("_") and module.name != "base"
     }
-    plugged = {point.name for point in importlib.metadata.entry_points(group=f"colift.{layer}")}
     registered = {kind for (of, kind) in _registered if of == layer}
-    return sorted(own | plugged | registered)
+    return sorted(own | _plugged(layer).keys() | registered)
+
+
+@cache
+def _plugged(layer: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Parts of other installed packages by name; looking through all of them takes a while."""
+    return {point.name: point for point in importlib.metadata.entry_points(group=f"colift.{layer}")}
 
 
 def find(layer: str, kind: str) -> type[Part]:
@@ -186,7 +192,7 @@ def find(layer: str, kind: str) -> type[Part]:
     valid = names(layer)
     if kind not in valid:
         raise UnknownNameError(f"{layer} part", kind, valid)
-    for point in importlib.metadata.entry_points(group=f"colift.{layer}", name=kind):
+    if point := _plugged(layer).get(kind):
         part = point.load()
         if not (isinstance(part, type) and issubclass(part, Part)):
             raise ColiftError(f"entry point {point.value!r} is not a colift part")

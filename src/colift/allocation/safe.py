@@ -230,6 +230,7 @@ class Safe(AllocatorPart):
     """
 
     kernel = _allocate
+    spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""

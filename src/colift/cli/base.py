@@ -77,8 +77,15 @@ def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
             temporary.write_text(text, encoding="utf-8")
     if report:
         from colift.report.html import write_report
+        from colift.viewer.data import payload
+        from colift.viewer.page import write_page
 
-        files["report"] = write_report(flown.recording, folder, metrics=flown.metrics)
+        label = flown.mission.kinds["allocation"]
+        data = payload([flown.recording], [flown.metrics], [label])
+        files["replay"] = write_page(folder / "replay.html", data)
+        files["report"] = write_report(
+            flown.recording, folder, metrics=flown.metrics, replay=files["replay"]
+        )
     return files
 
 
@@ -94,14 +101,14 @@ def numbers(text: str, least: int, most: int) -> list[int]:
 
 
 def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
-    """Print titled tables of text; the first and the last column may wrap."""
+    """Print titled tables of text; the first and the last column may wrap, a unit goes below its name."""
     for title, header, rows in tables:
         table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
         for k, name in enumerate(header):
             edge = k in (0, len(header) - 1)
             widest = max(len(row[k]) for row in rows) if edge else None
             table.add_column(
-                name, justify="left" if edge else "right", no_wrap=not edge,
+                name.replace(" (", "\n("), justify="left" if edge else "right", no_wrap=not edge,
                 min_width=widest and min(widest, 16),
             )  # fmt: skip
         for row in rows:

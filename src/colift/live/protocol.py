@@ -17,7 +17,9 @@ MAX_BYTES = 16_384
 
 Coordinate = Annotated[float, Field(ge=-1e3, le=1e3)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]
-Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[a-z][a-z_]*(\.[a-z0-9][a-z0-9_]*)*$")]
+Name = Annotated[
+    str, Field(min_length=1, max_length=64, pattern=r"^[a-z][a-z_]*(\.[a-z0-9][a-z0-9_]*)*$")
+]
 Kind = Annotated[str, Field(min_length=1, max_length=64)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -53,12 +54,13 @@ def cross_checks(
             )
     yield from _event_checks(frame, dict(_with_paths(parts, lists)), broken)
     yield from _criteria_checks(frame)
-    if not broken & {"world", "load", "drones"}:
+    if not broken & {"world", "load", "drones", "truth"}:
         for path, part in _with_paths(parts, lists):
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
-            for field, message in part.check(frame.team):
+            team = frame.true_team if part.layer == "plant" else frame.team
+            for field, message in part.check(team):
                 yield Problem(f"{path}.{field}", "", message)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
@@ -112,7 +114,14 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             if "drones" not in broken:
                 yield from _team_change(f"events.{i}.value", name, event.value, left, n)
         elif section == "load":
-            yield from _setting_change(f"events.{i}", frame.load, section, name, event.value)
+            found = list(_setting_change(f"events.{i}", frame.load, section, name, event.value))
+            yield from found
+            if not found and not broken & {"world", "load", "drones", "truth"}:
+                team = replace(frame.true_team, load_mass=float(event.value))
+                for field, message in present["plant"].check(team) if "plant" in present else ():
+                    yield Problem(
+                        f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
+                    )
         elif event.field in present:
             yield from _section_change(f"events.{i}", event.field, event.value, present)
         elif event.field == "allocation.kind":

@@ -1,4 +1,7 @@
-"""Pages of one file: no script, no request, dark and light, wide and narrow."""
+"""Pages of one file: no script, no request, dark and light, wide and narrow.
+
+The page of a flight may show a replay, which is a page of its own beside it.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +31,7 @@ font:1rem/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-seri
 overflow-wrap:break-word}
 h1{font-size:1.7rem;line-height:1.25;margin:0 0 .4rem}
 h2{font-size:1.15rem;margin:2.6rem 0 .7rem}
+h3{font-size:1rem;margin:1.6rem 0 .4rem}
 p{margin:.5rem 0}
 .soft,figcaption,th{color:var(--soft)}
 .facts{display:flex;flex-wrap:wrap;gap:.35rem .5rem;padding:0;margin:1rem 0;list-style:none;
@@ -39,13 +43,18 @@ border-radius:.25rem;margin:1.2rem 0;font-weight:600}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
 th{text-align:left;font-weight:600;font-size:.82rem}
-th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule);vertical-align:top}
+th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule)}
+td{vertical-align:top}
 th:last-child,td:last-child{padding-right:0}
-.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
+.number{text-align:right;font-variant-numeric:tabular-nums}
+td.number,.name{white-space:nowrap}
+th{vertical-align:bottom}
 code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,"DejaVu Sans Mono",monospace}
 td code{color:var(--soft)}
 figure{margin:0 0 2.2rem}
 figure .scroll{background:#fff;border:1px solid var(--rule);border-radius:.4rem;padding:.5rem}
+iframe{display:block;width:100%;aspect-ratio:16/10;min-height:30rem;border:1px solid var(--rule);
+border-radius:.4rem}
 figure svg,figure img{display:block;width:100%;height:auto;min-width:30rem}
 figcaption{font-size:.9rem;margin-top:.5rem}
 figcaption b{color:var(--ink)}
@@ -107,13 +116,28 @@ def figure(drawing: Drawing) -> str:
     )
 
 
+def frame(file: str) -> str:
+    """The replay in a frame that runs its scripts and may do nothing else, and a link to it alone."""
+    name = escape(file)
+    return (
+        f'<h2>Replay</h2>\n<iframe src="{name}" title="Replay in 3D" loading="lazy" '
+        'sandbox="allow-scripts"></iframe>\n'
+        f'<p class="soft">The frame shows <a href="{name}">{name}</a>, which must stand beside '
+        "this page.</p>"
+    )
+
+
 def details(summary: str, text: str) -> str:
     """Preformatted text that opens on demand."""
     return f"<details><summary>{escape(summary)}</summary><pre>{escape(text)}</pre></details>"
 
 
 def write_report(
-    source: Run | Recording, folder: str | Path, *, metrics: Mapping[str, float]
+    source: Run | Recording,
+    folder: str | Path,
+    *,
+    metrics: Mapping[str, float],
+    replay: Path | None = None,
 ) -> Path:
     """Write ``report.html`` and ``figures/<name>.png`` and ``.svg`` of one flight.
 
@@ -125,11 +149,13 @@ def write_report(
         Created if missing; files of the same name are replaced, each only by a whole one.
     metrics : mapping
         As from :func:`colift.metrics.compute`.
+    replay : path, optional
+        Page of the viewer in the same folder, shown in a frame.
 
     Returns
     -------
     Path
-        The page; it needs none of the other files. Equal recordings give equal bytes.
+        The page; it needs no other file but ``replay``. Equal recordings give equal bytes.
 
     """
     from colift.report.figures import drawable
@@ -142,12 +168,18 @@ def write_report(
         drawing.save(folder / "figures")
     target = folder / "report.html"
     with atomic_path(target) as temporary:
-        temporary.write_text(report(recording, metrics, drawings), encoding="utf-8", newline="\n")
+        text = report(recording, metrics, drawings, replay.name if replay else None)
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequence[Drawing]) -> str:
-    """The page of one flight."""
+def report(
+    recording: Recording,
+    metrics: Mapping[str, float],
+    drawings: Sequence[Drawing],
+    replay: str | None = None,
+) -> str:
+    """The page of one flight; ``replay`` is the file beside it that replays the flight."""
     mission = recording.mission
     versions = "\n".join(f"{name:9} {text}" for name, text in recording.versions.items())
     parts = [
@@ -166,6 +198,7 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
         criteria_table(judge(recording, metrics)),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
+        frame(replay) if replay else "",
         "<h2>Figures</h2>",
         *map(figure, drawings),
         "<h2>Provenance</h2>",
