@@ -77,7 +77,7 @@ def test_set_changes_any_field_and_the_table_shows_units(tmp_path: Path) -> None
         (("run", "--nonsense"), "No such option"),
         (("run", "--with", "nowhere.py"), "not a Python file"),
         (("bench", "--sizes", "4,x"), "not a list of whole numbers"),
-        (("bench", "--sizes", "0"), "between 1 and 1024"),
+        (("bench", "--sizes", "0"), "between 2 and 1024"),
         (("fly-away",), "No such command"),
     ],
 )

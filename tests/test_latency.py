@@ -16,25 +16,41 @@ from colift.team import Team
 
 
 def test_percentiles_missed_deadlines_and_the_worst_tick() -> None:
-    ticks = np.tile([1_000.0, 0.0, 4_000.0, 0.0], (1_000, 1))
-    ticks[7] = [2_000.0, 900_000.0, 5_000.0, 300_000.0]
+    ticks = np.tile([1_000.0, 0.0, 4_000.0, 0.0, 1.0], (1_000, 1))
+    ticks[7] = [2_000.0, 900_000.0, 5_000.0, 90_000.0, 3.0]
     found = latency.judge(ticks, 1e-3)
     assert found["median_us"] == pytest.approx(5.0)
-    assert found["worst_us"] == pytest.approx(1_207.0)
-    assert found["missed"] == 1
+    assert found["worst_us"] == pytest.approx(997.0)
+    assert found["missed"] == 0
+    assert (found["own_worst_iterations"], found["most_iterations"]) == (3, 3)
     assert found["worst_is_us"] == {
-        "late start": 2.0, "collector": 900.0, "allocator": 5.0, "preempted": 300.0
+        "late start": 2.0, "collector": 900.0, "allocator": 5.0, "preempted": 90.0
     }  # fmt: skip
     assert sum(found["histogram"]["ticks"]) == 1_000
     assert len(found["histogram"]["edges_us"]) == len(found["histogram"]["ticks"]) + 1
 
 
+def test_skipped_ticks_count_and_wait_for_the_answer_that_came_too_late() -> None:
+    assert latency.waits(np.array([5.0, 3_400.0, 6.0, 1_000.0]), 1e-3).tolist() == [
+        5.0, 3_400.0, 6.0, 1_000.0, 2_400.0, 1_400.0, 400.0
+    ]  # fmt: skip
+    ticks = np.tile([0.0, 0.0, 5_000.0, 0.0, 1.0], (996, 1))
+    ticks[500, latency.AWAY] = 4.3e6
+    found = latency.judge(ticks, 1e-3)
+    assert found["ticks"] == 1_000
+    assert found["skipped"] == 4
+    assert found["missed"] == 5
+    assert found["worst_us"] == pytest.approx(4_305.0)
+    assert sum(found["histogram"]["ticks"]) == 1_000
+
+
 @pytest.mark.parametrize("caller", latency.CALLERS)
 def test_every_caller_fills_every_tick(caller) -> None:
     ticks = np.concatenate(list(caller(Sqp(), Team.uniform(4), 0.3, 500.0)))
-    assert ticks.shape == (150, 4)
+    assert ticks.shape == (150, 5)
     assert np.isfinite(ticks).all()
     assert (ticks[:, latency.OWN] > 0.0).all()
+    assert (ticks[:, latency.ITERATIONS] >= 1.0).all()
     assert (ticks >= -1e5).all()  # no part is negative beyond the clocks' grain
 
 
@@ -58,4 +74,5 @@ def test_the_command_reports_every_case_and_leaves_no_process() -> None:
     assert [(r["caller"], r["allocator"]) for r in result["rows"]] == [
         (caller, name) for name in ("sqp", "safe") for caller in ("python", "untidy", "loop")
     ]
-    assert all(row["ticks"] == 200 for row in result["rows"])
+    assert result["schema"] == latency.SCHEMA
+    assert all(row["ticks"] - row["skipped"] == 200 for row in result["rows"])

@@ -20,9 +20,12 @@ from colift.report import comparison, figures, html, panels, render, style
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:
     """Two seconds of a mission at the coarse recording rate that figures need."""
-    events = load_mission(mission).events
-    early = [event.model_dump() | {"at": 1.0 + 0.1 * k} for k, event in enumerate(events)]
-    overrides = {"timing.duration": 2.0, "events": early, **settings}
+    loaded = load_mission(mission).resolved()
+    early = {
+        name: [item | {"at": 1.0 + 0.1 * k} for k, item in enumerate(loaded[name])]
+        for name in ("events", "fault")
+    }
+    overrides = {"timing.duration": 2.0, **early, **settings}
     return colift.run(mission, overrides=overrides).recording
 
 
@@ -88,9 +91,9 @@ def test_comparisons_draw(spiral: Recording) -> None:
         assert "&lt;baseline&gt; $a" in drawing.svg
 
 
-def test_files_are_written(written: Path) -> None:
+def test_files_are_written(spiral: Recording, written: Path) -> None:
     assert (written / "report.html").stat().st_size > 50_000
-    for name in figures.FIGURES:
+    for name in figures.drawable(spiral):
         svg = (written / "figures" / f"{name}.svg").read_text()
         assert "<svg" in svg
         assert svg.rstrip().endswith("</svg>")

@@ -51,5 +51,13 @@ class MissingExtraError(ColiftError):
     """A part calls a package that is not installed; the message names the extra that brings it."""
 
 
+class FlightDataError(ColiftError):
+    """A log of a real flight cannot be read; the message names the file and the place in it."""
+
+
+class BrowserError(ColiftError):
+    """No browser was found to draw in, or it could not draw."""
+
+
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""

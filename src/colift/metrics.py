@@ -1,4 +1,8 @@
-"""Numbers that judge a flight, each computed from its recording alone."""
+"""Numbers that judge a flight, each computed from its recording alone.
+
+A quantity that was not recorded gives NaN: the metric does not apply. Means are over time, not over
+rows, since the rows of a real flight are not evenly spaced.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +71,8 @@ def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str
         level = "bad" if level == "bad" else "warn"
     error = values.get("tracking_max_m", math.nan)
     if math.isfinite(error) and recording.outcome == "completed":
-        words.append(f"load within {100.0 * error:.2g} cm of its reference")
+        distance = f"{error:.2g} m" if error >= 1.0 else f"{100.0 * error:.2g} cm"
+        words.append(f"load within {distance} of its reference")
     limited = values.get("allocator_limited", 0.0)
     if limited > 0:
         words.append(f"in {limited:.0f} allocations the force gave way to limits")
@@ -113,33 +118,83 @@ def integral(values: NDArray[np.float64], time: NDArray[np.float64]) -> float:
     return float(np.trapezoid(values, time)) if len(time) > 1 else 0.0
 
 
+def mean(
+    values: NDArray[np.float64], time: NDArray[np.float64], axis: int | None = None
+) -> NDArray[np.float64]:
+    """Mean over time, s, of what is recorded: each row counts for the time around it.
+
+    Over all values, or with ``axis=0`` over the rows only; NaN where nothing is recorded.
+    """
+    spans = np.gradient(time) if len(time) > 1 else np.ones(1)
+    weights = np.where(np.isnan(values), 0.0, spans.reshape(-1, *[1] * (values.ndim - 1)))
+    total = weights.sum(axis=axis)
+    weighted = (weights * np.nan_to_num(values, posinf=np.inf, neginf=-np.inf)).sum(axis=axis)
+    return np.asarray(np.divide(weighted, total, out=np.full_like(total, np.nan), where=total > 0))
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.max()) if known.size else float("nan")
+
+
+def _count(statuses: NDArray[np.float64], counted: NDArray[np.bool_]) -> float:
+    known = ~np.isnan(statuses)
+    return float(np.count_nonzero(counted & known)) if known.any() else float("nan")
+
+
 def _total(recording: Recording) -> NDArray[np.float64]:
+    if not recording.measured("tensions"):
+        return np.full(len(recording.time), np.nan)
     return np.asarray(np.nansum(np.abs(recording["tensions"]), axis=1))
 
 
-def _smallest_angle(directions: NDArray[np.float64]) -> float:
+def _smallest_of_rows(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least number of each row; NaN for a row of which none is known."""
+    least = np.min(np.where(np.isnan(values), np.inf, values), axis=1)
+    return np.where(np.isinf(least), np.nan, least)
+
+
+def _smallest_angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smallest angle of any pair in each row, degrees; NaN for a single cable."""
     if directions.shape[1] < 2:
-        return float("nan")
+        return np.full(len(directions), np.nan)
     # In slices: pairs grow as n^2, and memory should not.
     rows = max(1, 2_000_000 // directions.shape[1] ** 2)
     parts = range(0, len(directions), rows)
-    smallest = [np.nanmin(pairwise_angles(directions[k : k + rows])) for k in parts]
-    return float(np.degrees(min(smallest)))
+    smallest = [_smallest_of_rows(pairwise_angles(directions[k : k + rows])) for k in parts]
+    return np.asarray(np.degrees(np.concatenate(smallest)))
+
+
+def _uncut(recording: Recording) -> NDArray[np.float64]:
+    """Actual directions; NaN for a cable that is cut, which makes no angle."""
+    cut = recording["attached"] == 0.0
+    return np.where(cut[..., None], np.nan, recording["directions"])
+
+
+def _smallest_angle(directions: NDArray[np.float64]) -> float:
+    return -_largest(-_smallest_angles(directions))
 
 
 @_metric("m", "root mean square of the load's distance from its reference")
 def tracking_rms_m(r: Recording) -> float:
-    return float(np.sqrt(np.mean(np.sum(tracking_error(r) ** 2, axis=1))))
+    return float(np.sqrt(mean(np.sum(tracking_error(r) ** 2, axis=1), r.time)))
 
 
 @_metric("m", "largest distance of the load from its reference")
 def tracking_max_m(r: Recording) -> float:
-    return float(np.linalg.norm(tracking_error(r), axis=1).max())
+    return _largest(np.linalg.norm(tracking_error(r), axis=1))
 
 
 @_metric("deg", "smallest angle between two actual cables at any time")
 def min_angle_deg(r: Recording) -> float:
-    return _smallest_angle(r["directions"])
+    return _smallest_angle(_uncut(r))
+
+
+@_metric("deg", "median over time of the smallest angle between two actual cables")
+def usual_angle_deg(r: Recording) -> float:
+    known = _smallest_angles(_uncut(r))
+    known = known[~np.isnan(known)]
+    return float(np.median(known)) if known.size else float("nan")
 
 
 @_metric("deg", "smallest angle between two wanted cables at any time")
@@ -154,17 +209,17 @@ def peak_total_tension_N(r: Recording) -> float:
 
 @_metric("N", "time average of the sum of tensions")
 def mean_total_tension_N(r: Recording) -> float:
-    return float(_total(r).mean())
+    return float(mean(_total(r), r.time))
 
 
 @_metric("N", "largest tension of any cable")
 def peak_tension_N(r: Recording) -> float:
-    return float(np.nanmax(r["tensions"]))
+    return _largest(r["tensions"])
 
 
 @_metric("N s", "sum of tensions integrated over the first 10 s (the paper's J_T)")
 def tension_integral_10s_Ns(r: Recording) -> float:
-    if r.time[-1] < 10.0 - 1e-9:
+    if r.time[0] > 0.0 or r.time[-1] < 10.0 - 1e-9:
         return float("nan")
     rows = r.time <= 10.0 + 1e-9
     return integral(_total(r)[rows], r.time[rows])
@@ -177,30 +232,62 @@ def tension_integral_Ns(r: Recording) -> float:
 
 @_metric("N", "root mean square of actual less wanted tension, over all cables")
 def tension_tracking_rms_N(r: Recording) -> float:
-    return float(np.sqrt(np.nanmean((r["tensions"] - r["desired_tensions"]) ** 2)))
+    return float(np.sqrt(mean((r["tensions"] - r["desired_tensions"]) ** 2, r.time)))
 
 
 @_metric("1", "largest over smallest mean tension of the cables")
 def tension_imbalance(r: Recording) -> float:
-    means = np.nanmean(r["tensions"], axis=0)
+    means = mean(r["tensions"], r.time, axis=0)
+    if np.isnan(means).any():
+        return float("nan")
     return float(means.max() / means.min()) if means.min() > 0 else float("inf")
+
+
+@_metric("1", "largest over mean power of the drones in flight, power taken as thrust^(3/2)")
+def energy_imbalance(r: Recording) -> float:
+    power = mean(np.maximum(r["thrusts"], 0.0) ** 1.5, r.time, axis=0)  # a rotor's induced power
+    return _largest(power) / float(power.mean()) if power.mean() > 0 else float("nan")
 
 
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
-    return float(np.nanmax(r["slack_times"], axis=0).sum())
+    return float(sum(_largest(times) for times in r["slack_times"].T))
+
+
+@_metric("m", "least height of the load")
+def min_height_m(r: Recording) -> float:
+    return float(r["load"][:, 0, 2].min())
+
+
+@_metric("1", "drones that left before the end")
+def lost_drones(r: Recording) -> float:
+    flying = ~np.isnan(r["attached"])
+    return float(np.count_nonzero(flying.any(axis=0) & ~flying[-1]))
+
+
+@_metric("s", "longest time from a cut cable or dead motors to the drone's leaving the team")
+def detection_delay_s(r: Recording) -> float:
+    broken = (r["attached"] == 0.0) | (r["motor_health"].max(axis=2) == 0.0)
+    delays = []
+    for drone in np.flatnonzero(broken.any(axis=0)):
+        since = int(np.argmax(broken[:, drone]))
+        gone = np.flatnonzero(np.isnan(r["attached"][since:, drone]))
+        delays.append(r.time[since + gone[0]] - r.time[since] if gone.size else math.inf)
+    return float(max(delays, default=math.nan))
 
 
 @_metric("1", "allocations that failed: not the best answer, and no limit to blame")
 def allocator_failures(r: Recording) -> float:
-    return float(np.count_nonzero(~np.isin(r["allocator_status"], [0, *_WITHIN_LIMITS])))
+    statuses = r["allocator_status"]
+    return _count(statuses, ~np.isin(statuses, [0, *_WITHIN_LIMITS]))
 
 
 @_metric(
     "1", "allocations whose force had to give way to a limit, or that were regaining the limits"
 )
 def allocator_limited(r: Recording) -> float:
-    return float(np.count_nonzero(np.isin(r["allocator_status"], _WITHIN_LIMITS)))
+    statuses = r["allocator_status"]
+    return _count(statuses, np.isin(statuses, _WITHIN_LIMITS))
 
 
 @_metric("1", "mean iterations of an allocation")

@@ -13,6 +13,7 @@ import importlib.util
 import pkgutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -174,9 +175,14 @@ def names(layer: str) -> list[str]:
         for module in pkgutil.iter_modules(folder.__path__)
         if not module.name.startswith("_") and module.name != "base"
     }
-    plugged = {point.name for point in importlib.metadata.entry_points(group=f"colift.{layer}")}
     registered = {kind for (of, kind) in _registered if of == layer}
-    return sorted(own | plugged | registered)
+    return sorted(own | _plugged(layer).keys() | registered)
+
+
+@cache
+def _plugged(layer: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Parts of other installed packages by name; looking through all of them takes a while."""
+    return {point.name: point for point in importlib.metadata.entry_points(group=f"colift.{layer}")}
 
 
 def find(layer: str, kind: str) -> type[Part]:
@@ -186,13 +192,39 @@ def find(layer: str, kind: str) -> type[Part]:
     valid = names(layer)
     if kind not in valid:
         raise UnknownNameError(f"{layer} part", kind, valid)
-    for point in importlib.metadata.entry_points(group=f"colift.{layer}", name=kind):
+    if point := _plugged(layer).get(kind):
         part = point.load()
         if not (isinstance(part, type) and issubclass(part, Part)):
             raise ColiftError(f"entry point {point.value!r} is not a colift part")
         return part
     module = importlib.import_module(f"colift.{layer}.{kind.replace('-', '_')}")
     return _parts_of(module, module.__name__)[0]
+
+
+def make(layer: str, table: Mapping[str, Any]) -> Part:
+    """The part that a mission's section describes: its ``kind`` and its settings.
+
+    Raises
+    ------
+    UnknownNameError
+        For a kind that the layer does not have.
+    ValueError
+        For settings that the part refuses (a pydantic ``ValidationError``).
+
+    """
+    settings = dict(table)
+    return find(layer, str(settings.pop("kind", ""))).model_validate(settings)
+
+
+def kind_of(part: type[Part]) -> str:
+    """The name under which :func:`find` has a class."""
+    for (layer, kind), registered in _registered.items():
+        if layer == part.layer and registered is part:
+            return kind
+    if part.__module__.startswith(f"colift.{part.layer}."):
+        return part.__module__.rpartition(".")[2].replace("_", "-")
+    points = importlib.metadata.entry_points(group=f"colift.{part.layer}")
+    return next(point.name for point in points if point.load() is part)
 
 
 def _parts_of(module: Any, name: str) -> list[type[Part]]:

@@ -2,11 +2,14 @@
 
 Layout of the HDF5 file (format version 1)::
 
-    /                     attributes: format, mission (JSON), seed, versions (JSON), outcome
+    /                     attributes: format, mission (JSON), seed, versions (JSON), outcome,
+                          source, provenance (JSON), commands (JSON)
     /time                 (rows,) s
     /signals/<name>       (rows, ...) attributes: unit, symbol, frame, meaning
     /allocator/time       (cycles,) s
     /allocator/<name>     (cycles,) attributes as above
+
+What was not measured is NaN. Files written before ``source`` and ``provenance`` came are simulations.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ import json
 import os
 import platform
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -27,7 +30,7 @@ from numpy.typing import NDArray
 
 from colift.errors import MissionError, RecordingError
 from colift.mission.load import load_mission
-from colift.mission.schema import Mission
+from colift.mission.schema import Mission, RealFlight
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
 
 Array = NDArray[np.float64]
@@ -70,23 +73,29 @@ class Recording(Mapping[str, Array]):
 
     Attributes
     ----------
-    mission : Mission
-        As flown, with every default filled in.
+    mission : Mission or RealFlight
+        As flown, with every default filled in; of a real flight, what is known of it.
     time : (rows,) array
-        Times of the signals, s.
+        Times of the signals, s; increasing, in a real flight not evenly.
     cycle_time : (cycles,) array
         Times of the allocations, s.
     outcome : str
         ``"completed"``, or how the flight ended.
+    provenance : dict
+        Where the data of a real flight come from, and what was inferred; empty for a simulation.
+    commands : list of (time, text)
+        What a person did while it flew, s.
 
     """
 
-    mission: Mission
+    mission: Mission | RealFlight
     time: Array
     cycle_time: Array
     arrays: dict[str, Array]
     outcome: str = "completed"
     versions: dict[str, str] = field(default_factory=versions)
+    provenance: dict[str, Any] = field(default_factory=dict)
+    commands: Sequence[tuple[float, str]] = ()
 
     def __getitem__(self, name: str) -> Array:
         try:
@@ -105,6 +114,15 @@ class Recording(Mapping[str, Array]):
         """Number of drones."""
         return self.mission.drones.count
 
+    @property
+    def source(self) -> str:
+        """``"simulation"``, or ``"flight"`` for one that was flown in the real world."""
+        return "flight" if isinstance(self.mission, RealFlight) else "simulation"
+
+    def measured(self, *names: str) -> bool:
+        """Whether each of these signals has any number in it."""
+        return not any(np.isnan(self[name]).all() for name in names)
+
     @staticmethod
     def signal(name: str) -> Signal:
         """Unit, shape, frame and meaning of a signal."""
@@ -121,6 +139,9 @@ class Recording(Mapping[str, Array]):
             file.attrs["seed"] = self.mission.seed
             file.attrs["versions"] = json.dumps(self.versions)
             file.attrs["outcome"] = self.outcome
+            file.attrs["source"] = self.source
+            file.attrs["provenance"] = json.dumps(self.provenance)
+            file.attrs["commands"] = json.dumps(list(self.commands))
             _write(file, "time", self.time, Signal("time", (), "s", "t", "-", "time"))
             _write(
                 file, "allocator/time", self.cycle_time,
@@ -155,13 +176,20 @@ class Recording(Mapping[str, Array]):
                     short = signal.name.removeprefix("allocator_")
                     target = "solve_time" if short == "time" else short
                     arrays[signal.name] = file[f"allocator/{target}"][()]
+                known = dict(json.loads(file.attrs["mission"]))
+                real = file.attrs.get("source") == "flight"
                 return cls(
-                    mission=load_mission(dict(json.loads(file.attrs["mission"]))),
+                    mission=RealFlight.model_validate(known) if real else load_mission(known),
                     time=file["time"][()],
                     cycle_time=file["allocator/time"][()],
                     arrays=arrays,
                     outcome=str(file.attrs["outcome"]),
                     versions=json.loads(file.attrs["versions"]),
+                    provenance=json.loads(file.attrs.get("provenance", "{}")),
+                    commands=[
+                        (float(time), str(text))
+                        for time, text in json.loads(file.attrs.get("commands", "[]"))
+                    ],
                 )
         except (OSError, KeyError, ValueError, TypeError, MissionError) as error:
             raise RecordingError(f"{path}: cannot be read as a recording: {error}") from error

@@ -37,7 +37,9 @@ class Run:
     @property
     def mission(self) -> Mission:
         """The mission as flown."""
-        return self.recording.mission
+        mission = self.recording.mission
+        assert isinstance(mission, Mission)  # what a run records was simulated
+        return mission
 
     @cached_property
     def metrics(self) -> dict[str, float]:

@@ -7,11 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from colift.allocation._safe_cycle import JUMP, TURN
 from colift.allocation.safe import RATE_BARRIER, SafeAllocator
+from colift.geometry import rotation_between
 from colift.team import Team
 
 
-def barrier_problem(allocator: SafeAllocator, before, acceleration, w):
+def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
     """The function that one cycle minimises, written down a second time from the docstring."""
     part, team = allocator.part, allocator.team
     sigma = team.load_mass * team.gravity / team.n
@@ -35,20 +37,37 @@ def barrier_problem(allocator: SafeAllocator, before, acceleration, w):
     ]
     rate = np.sum(before * w, axis=1) - math.cos(delta) * T
     value = 0.5 * T @ T + part.mu / sigma**2 * np.sum(gram[i, j] ** 2)
-    value += rho * np.sum(1.0 - np.sum(alpha * before, axis=1))
+    value += rho * np.sum(1.0 - np.sum(alpha * home, axis=1))
     value -= part.barrier * sum(np.sum(np.log(g)) for g in limits)
     value -= 0.5 * RATE_BARRIER * max(rho, 1.0) * delta**2 * np.sum(np.log(rate))
     return value - np.sum(kappa_pair * np.log(math.cos(least) - gram[i, j]))
 
 
+def turned(allocator, before, facing, force):
+    """Centre of the proximal term, and the direction of the force that it follows."""
+    aim = force / np.linalg.norm(force)
+    if facing is None:
+        return before, aim
+    part, dt = allocator.part, allocator.dt
+    way = aim - facing
+    size = np.linalg.norm(way)
+    share = min(dt / (part.turning + dt), TURN * part.max_rate * dt / size)
+    fresh = facing + share / (1.0 + (size / JUMP) ** 4) * way
+    fresh /= np.linalg.norm(fresh)
+    turn = rotation_between(facing, fresh).T
+    return before @ turn @ turn, fresh
+
+
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
 def test_the_answer_is_stationary_in_every_direction_that_keeps_the_force(n):
     allocator = SafeAllocator(n, max_thrust=12.0, max_tilt_deg=60.0, tolerance=1e-10)
-    rng = np.random.default_rng(n)
+    rng, facing = np.random.default_rng(n), None
     for _ in range(20):
         before = allocator._directions.copy()
         acceleration = 0.2 * rng.standard_normal(3)
-        answer = allocator.allocate(0.225 * (acceleration + [0.0, 0.0, 9.81]), acceleration)
+        force = 0.225 * (acceleration + [0.0, 0.0, 9.81])
+        home, facing = turned(allocator, before, facing, force)
+        answer = allocator.allocate(force, acceleration)
         if not answer.status.ok:
             continue
         sigma = 0.225 * 9.81 / n
@@ -57,8 +76,8 @@ def test_the_answer_is_stationary_in_every_direction_that_keeps_the_force(n):
             step = rng.standard_normal((n, 3))
             step -= step.mean(axis=0)
             h = 1e-6
-            up = barrier_problem(allocator, before, acceleration, w + h * step)
-            down = barrier_problem(allocator, before, acceleration, w - h * step)
+            up = barrier_problem(allocator, before, home, acceleration, w + h * step)
+            down = barrier_problem(allocator, before, home, acceleration, w - h * step)
             assert abs(up - down) / (2 * h) < 1e-4
 
 

@@ -66,10 +66,11 @@ def test_flies_two_seconds_without_failures(name):
     assert run.metrics["tracking_max_m"] < 0.1
 
 
-def _short(name):
-    resolved = load_mission(name).resolved()
+def _short(mission):
+    resolved = load_mission(mission).resolved()
     resolved["timing"]["duration"] = 2.0
-    resolved["events"] = [e for e in resolved["events"] if e["at"] <= 2.0]
+    for name in ("events", "fault"):
+        resolved[name] = [item for item in resolved[name] if item["at"] <= 2.0]
     return colift.run(resolved)
 
 

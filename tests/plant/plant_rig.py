@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from colift.plant._bodies import DRONE, LOAD, state_size
+from colift.plant._bodies import BODY, DRONE, LOAD, MASS, state_size
+from colift.plant._chain import BEAD, CABLE
 from colift.plant.base import Start
 from colift.plant.rigid_cables import RigidCables
 from colift.team import Team
@@ -25,7 +26,7 @@ def rotation(q):
 
 
 class Rig:
-    """A plant and its team; ``load`` (2, 3) and ``drones`` (n, 13) are views of the state."""
+    """A plant and its team; ``load`` (2, 3), ``drones`` (n, 13) and ``beads`` (n, k, 6) are views of its state."""
 
     def __init__(self, team, directions, part=None, *, spin=None, attitudes=None, body_rates=None):
         n = team.n
@@ -37,13 +38,22 @@ class Rig:
         self.state = self.memory[: state_size(n)]
         self.load = self.state[:LOAD].reshape(2, 3)
         self.drones = self.state[LOAD:].reshape(n, DRONE)
+        k, size = getattr(self.part, "bead_count", 0), self.state.size
+        self.beads = self.memory[size : size + BEAD * k * n].reshape(n, k, BEAD)
         if spin is not None:  # angular velocities of the cables
             self.drones[:, 3:6] = -team.cable_lengths[:, None] * np.cross(spin, directions)
         if body_rates is not None:
             self.drones[:, 10:13] = body_rates
+        self.straighten()
         self.thrusts, self.torques = np.zeros(n), np.zeros((n, 3))
         self.external, self.attached = np.zeros((n + 1, 3)), np.ones(n)
         self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
+
+    def straighten(self):
+        """Put beads evenly between drone and load, in motion with them."""
+        k = self.beads.shape[1]
+        down = np.arange(1, k + 1)[:, None] / (k + 1)
+        self.beads[:] = (1.0 - down) * self.drones[:, None, :BEAD] + down * self.load.ravel()
 
     def step(self, dt=0.001, count=1):
         for _ in range(count):
@@ -59,27 +69,46 @@ class Rig:
         type(self.part).observe(self.params, self.memory, *out)
         return dict(zip(OBSERVED, out, strict=True))
 
+    def points(self):
+        """Masses (N,), positions and velocities (N, 3) of everything that has mass."""
+        masses = [self.params[:1], self.params[MASS : MASS + BODY * self.n : BODY]]
+        states = [self.state[None, :LOAD], self.drones[:, :LOAD]]
+        if self.beads.size:
+            cables = self.params[MASS + BODY * self.n :][: CABLE * self.n].reshape(self.n, CABLE)
+            masses.append(np.repeat(cables[:, 3], self.beads.shape[1]))
+            states.append(self.beads.reshape(-1, BEAD))
+        x = np.concatenate(states)
+        return np.concatenate(masses), x[:, :3], x[:, 3:]
+
     def kinetic_energy(self):
         """Of the bodies as points, J; the attitudes' is separate."""
-        s, team = self.observe(), self.team
-        load = 0.5 * team.load_mass * s["load"][1] @ s["load"][1]
-        return load + 0.5 * team.masses @ np.sum(s["velocities"] ** 2, axis=1)
+        m, _, v = self.points()
+        return 0.5 * m @ np.sum(v**2, axis=1)
+
+    def strain_energy(self):
+        """Of elastic segments, J; zero for plants without."""
+        if not hasattr(self.part, "stiffness"):
+            return 0.0
+        nodes = [self.drones[:, None, :3], self.beads[:, :, :3]]
+        nodes = np.concatenate([*nodes, np.tile(self.load[0], (self.n, 1, 1))], axis=1)
+        lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
+        rest = self.team.cable_lengths[:, None] / lengths.shape[1]
+        stretch = np.maximum(lengths - rest, 0.0) * self.attached[:, None]
+        return 0.5 * np.sum(self.part.stiffness / rest * stretch**2)
 
     def energy(self):
-        """Translational and potential energy, J; that of attitudes and cables is separate."""
-        s, team = self.observe(), self.team
-        height = team.load_mass * s["load"][0, 2] + team.masses @ s["positions"][:, 2]
-        return self.kinetic_energy() + team.gravity * height
+        """Translational, potential and elastic energy, J; that of attitudes is separate."""
+        m, x, _ = self.points()
+        return self.kinetic_energy() + self.team.gravity * m @ x[:, 2] + self.strain_energy()
 
     def momentum(self):
-        s, team = self.observe(), self.team
-        return team.load_mass * s["load"][1] + team.masses @ s["velocities"]
+        m, _, v = self.points()
+        return m @ v
 
     def angular_momentum(self):
         """Of all bodies as points, about the world's origin."""
-        s, team = self.observe(), self.team
-        drones = np.cross(s["positions"], team.masses[:, None] * s["velocities"]).sum(axis=0)
-        return drones + team.load_mass * np.cross(s["load"][0], s["load"][1])
+        m, x, v = self.points()
+        return m @ np.cross(x, v)
 
     def spin_momentum(self):
         """J Omega of each drone, turned into the world frame."""
@@ -100,6 +129,19 @@ def random_team(rng, n, *, gravity=9.81):
     )
 
 
+def slack_rig(seed, n, part=None, *, gravity=9.81, speed=2.0):
+    """Drones anywhere within reach of the load, all bodies in motion."""
+    rng = np.random.default_rng(seed)
+    directions = rng.normal(size=(n, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    rig = Rig(random_team(rng, n, gravity=gravity), directions, part)
+    rig.drones[:, :3] *= rng.uniform(0.3, 1.0, (n, 1))
+    rig.drones[:, 3:6] = speed * rng.normal(size=(n, 3))
+    rig.load[1] = speed * rng.normal(size=3)
+    rig.straighten()
+    return rig, rng
+
+
 def random_rig(seed, n, part=None, *, gravity=9.81, spin=2.0):
     """Any state with taut cables."""
     rng = np.random.default_rng(seed)
@@ -115,4 +157,5 @@ def random_rig(seed, n, part=None, *, gravity=9.81, spin=2.0):
     shift = rng.normal(size=6)
     rig.load.ravel()[:] += shift
     rig.drones[:, :6] += shift
+    rig.straighten()
     return rig, rng

@@ -16,7 +16,7 @@ from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
 
 
 def synthetic(n=4, duration=20.0, period=0.01):
-    """A flight of known numbers: error 3 cm and 4 cm in turn, total tension 1 + t N."""
+    """A flight of known numbers: error 3 cm and 4 cm in turn, total tension 1 + t N, a lost drone."""
     time = np.arange(round(duration / period) + 1) * period
     rows = len(time)
     arrays = {s.name: np.zeros((rows, *s.shape_for(n))) for s in SIGNALS}
@@ -32,6 +32,12 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["directions"][rows // 2] = ring(n, np.radians(35.0))
     arrays["desired_directions"][:] = ring(n, np.radians(30.0))
     arrays["slack_times"][-1] = 0.5
+    arrays["thrusts"][:] = 1.0
+    arrays["thrusts"][:, 0] = 4.0
+    arrays["attached"][:] = arrays["motor_health"][:] = 1.0
+    if n > 1:  # a cable is cut, its drone leaves 0.12 s later
+        arrays["attached"][-200:-188, 1] = 0.0
+        arrays["attached"][-188:, 1] = np.nan
     cycles = {s.name: np.zeros(101) for s in CYCLE_SIGNALS}
     cycles["allocator_status"][[3, 70, 90]] = [1.0, 4.0, 6.0]
     cycles["allocator_iterations"][:] = 2.0
@@ -51,6 +57,7 @@ EXPECTED = {
     "tracking_rms_m": math.sqrt((1001 * 0.03**2 + 1000 * 0.04**2) / 2001),
     "tracking_max_m": 0.04,
     "min_angle_deg": neighbour_angle(35.0),
+    "usual_angle_deg": neighbour_angle(40.0),
     "min_desired_angle_deg": neighbour_angle(30.0),
     "peak_total_tension_N": 21.0,
     "mean_total_tension_N": 11.0,
@@ -59,7 +66,11 @@ EXPECTED = {
     "tension_integral_Ns": 20.0 + 200.0,
     "tension_tracking_rms_N": 0.25,
     "tension_imbalance": 4.0,
+    "energy_imbalance": 8.0 / ((8.0 + 3.0) / 4.0),
     "slack_time_s": 2.0,
+    "min_height_m": 3.0 - 0.04,
+    "lost_drones": 1.0,
+    "detection_delay_s": 0.12,
     "allocator_failures": 2.0,
     "allocator_limited": 1.0,
     "allocator_mean_iterations": 2.0 + 10.0 / 101.0,
@@ -83,6 +94,26 @@ def test_every_metric_has_a_known_answer_a_unit_and_a_meaning():
         assert metric.meaning
         suffix = metric.unit.replace(" ", "")
         assert metric.unit == "1" or name.endswith(f"_{suffix}")
+
+
+def test_the_angle_of_a_cut_cable_does_not_count():
+    recording = synthetic()
+    cut = recording["attached"][:, 1] == 0.0
+    recording["directions"][cut, 1] = recording["directions"][cut, 0]
+    assert metrics.compute(recording)["min_angle_deg"] == pytest.approx(neighbour_angle(35.0))
+
+
+def test_a_fault_that_nobody_finds_takes_for_ever():
+    recording = synthetic()
+    recording["attached"][-188:, 1] = 0.0
+    values = metrics.compute(recording)
+    assert values["detection_delay_s"] == math.inf
+    assert values["lost_drones"] == 0.0
+    recording["attached"][:] = 1.0
+    assert math.isnan(metrics.compute(recording)["detection_delay_s"])
+    recording["motor_health"][-100:-90, 2] = 0.0
+    recording["attached"][-90:, 2] = np.nan
+    assert metrics.compute(recording)["detection_delay_s"] == pytest.approx(0.1)
 
 
 def test_angles_do_not_apply_to_one_cable():

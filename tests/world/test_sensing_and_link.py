@@ -172,14 +172,14 @@ def test_flights_repeat_by_the_seed_in_one_stretch_or_many():
 
 
 def test_a_drone_keeps_its_bias_when_another_leaves():
-    table = noisy_table(**QUIET, position_bias=0.01)
+    table = noisy_table(**QUIET, **PROMPT, position_bias=0.01)
     flight = Flight(load_mission(table))
     flight.advance(0.1)
     before = (flight.bus.measured_positions - flight.bus.positions)[1:]
     flight.regroup([1, 2, 3])
     flight.advance(0.1)
     after = flight.bus.measured_positions - flight.bus.positions
-    np.testing.assert_allclose(after, before, atol=2e-3)  # it moves a little within the delay
+    np.testing.assert_allclose(after, before, atol=2e-4)  # it moves a little within a step
     assert np.abs(before).max() > 5e-3
 
 

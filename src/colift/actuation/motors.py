@@ -23,6 +23,7 @@ _X = (1.0, -1.0, -1.0, 1.0)
 _Y = (1.0, 1.0, -1.0, -1.0)
 _SPIN = (1.0, -1.0, 1.0, -1.0)
 
+_ROUNDING = 1e-9  # N, by which a thrust may miss its limits before the mixer gives something up
 _HEAD = 8  # params before the drones' largest thrusts: lever, ratio, lag, rate, noise, offset (2), least
 _SLOTS = 9  # memory per drone: started, thrust and noise of each motor
 
@@ -31,26 +32,32 @@ _SLOTS = 9  # memory per drone: started, thrust and noise of each motor
 def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[no-untyped-def]
     """Thrusts (4) within ``low`` and ``high`` for a thrust and three torques.
 
-    Where not all can be had: roll and pitch keep their ratio and, up to half of the range, their size; then the
-    thrust comes as near as they leave room for; yaw takes what is left.
+    Where not all can be had: roll and pitch keep their ratio and, as far as the motors' range and the wanted thrust
+    allow, their size; thrust is lowered, never raised, to make room for them; yaw takes what is left.
     """
+    yaw = 0.25 * tau_z / ratio
+    fits = True
     least, most = math.inf, -math.inf
     for j in range(4):
         out[j] = 0.25 * (_Y[j] * tau_x - _X[j] * tau_y) / lever
         least, most = min(least, out[j]), max(most, out[j])
-    shrink = min(1.0, (high - low) / max(most - least, 1e-300))
-    common = min(max(0.25 * f, low - shrink * least), high - shrink * most)
-    yaw = 0.25 * tau_z / ratio
-    share = 1.0
+        exact = 0.25 * f + out[j] + _SPIN[j] * yaw
+        fits = fits and low - _ROUNDING <= exact <= high + _ROUNDING
+    common, shrink, share = 0.25 * f, 1.0, 1.0
+    if not fits:
+        common = min(max(common, low), high)
+        shrink = min(1.0, (high - low) / max(most - least, 1e-300))
+        shrink = min(shrink, (common - low) / max(-least, 1e-300))
+        common = min(common, high - shrink * most)
+        for j in range(4):
+            step = _SPIN[j] * yaw
+            held = common + shrink * out[j]
+            if step > 0.0:
+                share = min(share, max(high - held, 0.0) / step)
+            elif step < 0.0:
+                share = min(share, max(held - low, 0.0) / -step)
     for j in range(4):
-        out[j] = common + shrink * out[j]
-        step = _SPIN[j] * yaw
-        if step > 0.0:
-            share = min(share, max(high - out[j], 0.0) / step)
-        elif step < 0.0:
-            share = min(share, max(out[j] - low, 0.0) / -step)
-    for j in range(4):
-        out[j] = min(max(out[j] + share * _SPIN[j] * yaw, low), high)
+        out[j] = min(max(common + shrink * out[j] + share * _SPIN[j] * yaw, low), high)
 
 
 @kernel(SIGNATURE)
@@ -93,9 +100,9 @@ def _turn(  # type: ignore[no-untyped-def]
 class Motors(ActuationPart):
     """A quadrotor's four motors, each a first-order lag with limits of thrust and of its rate.
 
-    The motors stand on arms at 45 degrees to the body axes. The mixer inverts thrust and torques; where limits
-    do not allow all, yaw gives way first, then thrust, and roll and pitch last: a drone that cannot
-    turn cannot aim its thrust either. A weak motor gives its share of health; the mixer is not told.
+    The motors stand on arms at 45 degrees to the body axes. The mixer inverts thrust and torques. Where limits do
+    not allow all, yaw gives way first; near full thrust, thrust gives way to roll and pitch, for a drone that
+    cannot turn cannot aim; near none, they give way to it. A weak motor gives its share; the mixer is not told.
 
     Defaults are chosen for the paper's drone of 0.5 kg: 2.4 times its weight, a lag between those of RotorS'
     Hummingbird (12.5 ms up, 25 ms down) and a torque ratio near that model's 0.016 m.

@@ -16,6 +16,7 @@ import math
 
 from colift.allocation import _safe_newton as newton
 from colift.allocation import _safe_recovery as recovery
+from colift.allocation._sqp_newton import rotate
 from colift.jit import inline
 
 (
@@ -30,6 +31,7 @@ from colift.jit import inline
     REACH,
     MAX_RATE,
     SETTLING,
+    TURNING,
     BOUND_H,
     BOUND_V,
     TOLERANCE,
@@ -40,7 +42,7 @@ from colift.jit import inline
     TILT,
     TOTAL,
     EQUAL,
-) = range(21)
+) = range(22)
 """Places in the parameter vector; HEAD of them, then PER_CABLE values for each cable."""
 HEAD = 24
 PER_CABLE = 5
@@ -55,6 +57,10 @@ F_MAX, COS_TILT = newton.F_MAX, newton.COS_TILT
 
 CONVERGED, ITERATION_LIMIT, FORCE_REDUCED = 0, 1, 2
 
+TURN = 0.4
+"""Largest turn of the formation in one cycle, in turns of the rate limit."""
+JUMP = 0.2
+"""Distance between force and direction followed, rad, from which on the formation waits."""
 KEEP = 0.05
 """Part of its margin that every limit keeps in one step."""
 Z_BAND = 10.0
@@ -87,6 +93,38 @@ def sort_cables(n, directions, order):  # type: ignore[no-untyped-def]
             order[j + 1] = order[j]
             j -= 1
         order[j + 1] = moving
+
+
+@inline
+def turn_home(n, fx, fy, fz, W, follow, most, data, facing, homes, spare):  # type: ignore[no-untyped-def]
+    """Turn the directions that the proximal term holds on to with the force, which is followed smoothly.
+
+    ``facing`` (3,) is the direction followed so far, zero at the start; ``follow`` the share of the way to
+    that of the force, ``most`` the largest turn, rad. Noise moves no cable, a manoeuvre turns the whole
+    formation, and a jump is waited out: it may jump back. The barrier of the rate holds on to the last
+    directions as strongly as the proximal term (``RATE_BARRIER``), and does not turn: twice the turn
+    puts the middle of both where it should be.
+    """
+    x, y, z = fx / W, fy / W, fz / W
+    ax, ay, az = facing[0], facing[1], facing[2]
+    if ax * ax + ay * ay + az * az > 0.5:
+        x, y, z = x - ax, y - ay, z - az
+        size = math.sqrt(x * x + y * y + z * z)
+        follow = min(follow, most / max(size, 1e-300)) / (1.0 + (size / JUMP) ** 4)
+        x, y, z = ax + follow * x, ay + follow * y, az + follow * z
+        norm = math.sqrt(x * x + y * y + z * z)
+        if norm < 1e-3:
+            return
+        x, y, z = x / norm, y / norm, z / norm
+        for i in range(n):
+            for k in range(3):
+                homes[3 * i + k] = data[newton.DATA * i + newton.HOME + k]
+        for _ in range(2):
+            rotate(n, ax, ay, az, x, y, z, homes, spare)
+        for i in range(n):
+            for k in range(3):
+                data[newton.DATA * i + newton.HOME + k] = homes[3 * i + k]
+    facing[0], facing[1], facing[2] = x, y, z
 
 
 @inline

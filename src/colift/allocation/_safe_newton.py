@@ -1,8 +1,8 @@
 """The safe allocation problem: primal-dual interior-point steps at the cost of a sparse 2n system.
 
 Problem, in *force coordinates* ``w_i = T_i alpha_i`` (the pull of drone i on the load is ``-w_i``), scaled by
-``sigma = m_L g / n``. With weights ``omega_i``, the last answer's directions ``a_i`` (``b_i``: the same, after
-recovery has moved those outside a limit) and the thrust ``p_i - w_i`` of each drone,
+``sigma = m_L g / n``. With weights ``omega_i``, the last answer's directions ``a_i`` (``b_i``: the same, turned
+with the force, or after recovery has moved those outside a limit) and the thrust ``p_i - w_i`` of each drone,
 ``p_i = m_i (g e3 + a_d)``::
 
     min  1/2 sum omega_i T_i^2 + mu sum_{i<j} c_ij^2            (the paper's eq. 7)

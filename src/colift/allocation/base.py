@@ -73,6 +73,8 @@ class AllocatorPart(Part):
     """Base of all allocators: settings, kernel with :data:`SIGNATURE`, parameters and memory."""
 
     layer: ClassVar[str] = "allocation"
+    spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
+    """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""

@@ -68,6 +68,7 @@ class InternalForce(AllocatorPart):
     """
 
     kernel = _allocate
+    spread_setting = ("internal_force", (0.1, 0.2, 0.4, 0.7, 1.0))
 
     internal_force: Annotated[float, Field(ge=0.0, le=1e6)] = 0.4
     """Internal force ``t_L`` of each cable, N."""

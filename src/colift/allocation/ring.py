@@ -17,6 +17,8 @@ class Ring(FixedPattern):
     Not the unpublished baseline of the paper's authors: a reference point for any allocator.
     """
 
+    spread_setting = ("cone_deg", (15.0, 25.0, 35.0, 45.0, 55.0))
+
     cone_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 35.0
     """Half-angle of the cone, degrees."""
     heading_deg: float = 0.0

@@ -80,7 +80,8 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     o += newton.SYSTEM
     lam = memory[o : o + 3]
     M = memory[o + 3 : o + 9]
-    o += 9
+    facing = memory[o + 9 : o + 12]
+    o += 12
     integers = memory[o : o + 2 * n + 2 * most].view(np.int64)
     order = integers[:n]
     first = integers[n : 2 * n]
@@ -127,6 +128,9 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
         alpha,
         w,
     )
+    if W > 1e-6 and not relaxed:
+        follow = period / (params[cycle.TURNING] + period)
+        cycle.turn_home(n, fx, fy, fz, W, follow, cycle.TURN * delta, data, facing, w_new, dw)
     m = cycle.near_pairs(
         n,
         params[cycle.MIN_ANGLE],
@@ -209,7 +213,7 @@ Degrees = Annotated[float, Field(gt=0.0, lt=90.0)]
 Force = Annotated[float, Field(gt=0.0, le=1e6)]
 
 RATE_BARRIER = 1.0
-"""Barrier of the rate limit, relative to the proximal term at the limit: a smoother of its own."""
+"""Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
 GIVE_WAY = 20.0
 """Price of horizontal force, in shares of the load per cable, at which the force gives way."""
 VERTICAL_FIRST = 20.0
@@ -221,10 +225,12 @@ class Safe(AllocatorPart):
 
     The limits hold in every answer. Where they do not allow the whole force, the force gives way, its
     horizontal part first. Which member of the paper's flat family of optima is chosen, and kept, is
-    decided by the barrier of the pairs (``spread``) and a proximal term (``settling``).
+    decided by the barrier of the pairs (``spread``) and a proximal term (``settling``), whose centre turns with
+    the force (``turning``).
     """
 
     kernel = _allocate
+    spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""
@@ -251,6 +257,8 @@ class Safe(AllocatorPart):
     """Weight of each cable's squared tension, such as the inverse of a battery's charge."""
     settling: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     """Time with which directions settle at the optimum, s; tensions follow at once."""
+    turning: Annotated[float, Field(ge=0.0, le=10.0)] = 0.04
+    """Time with which the formation as a whole turns with the force, s."""
     spread: Annotated[float, Field(ge=1e-6, le=1.0)] = 1e-2
     """Barrier between near cables, in squared shares of the load; more spreads them wider."""
     barrier: Annotated[float, Field(ge=1e-7, le=0.1)] = 1e-3
@@ -328,6 +336,7 @@ class Safe(AllocatorPart):
         head[cycle.REACH] = self._reach(n)
         head[cycle.MAX_RATE] = self.max_rate
         head[cycle.SETTLING] = self.settling
+        head[cycle.TURNING] = self.turning
         head[cycle.BOUND_H] = GIVE_WAY
         head[cycle.BOUND_V] = GIVE_WAY * VERTICAL_FIRST
         head[cycle.TOLERANCE] = self.tolerance
@@ -358,7 +367,7 @@ class Safe(AllocatorPart):
         pairs = n * (n - 1) // 2
         limits = newton.LIMITS * n + pairs
         cables = newton.DATA + 16 + newton.ROW + 2 * newton.RHS + 2  # 2: order, first
-        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 9)
+        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 12)
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         mu = self.mu

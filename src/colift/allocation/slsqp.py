@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from colift.allocation._oracle import Oracle, outcome_of, tension_problem
+from colift.allocation._oracle import Oracle, TensionProblem, outcome_of, tension_problem
 from colift.allocation._plain import Outcome, Problem, plain_kernel
+from colift.part import Vector
 
 
-def _solve(problem: Problem) -> Outcome:
+def minimise(asked: TensionProblem, z: Vector, tolerance: float, iterations: int) -> Any:
+    """SciPy's answer from the point ``z`` (4n,)."""
     from scipy.optimize import minimize
 
-    asked = tension_problem(problem)
-    tolerance, iterations = float(problem.params[1]), int(problem.params[2])
     scale = 1.0 / max(1.0, asked.mu)
-    answer = minimize(
+    return minimize(
         lambda z: scale * asked.objective(z),
-        np.concatenate([problem.shares, problem.directions.ravel()]),
+        z,
         jac=lambda z: scale * asked.gradient(z),
         method="SLSQP",
         bounds=asked.bounds(),
@@ -26,6 +28,13 @@ def _solve(problem: Problem) -> Outcome:
         ][: 2 if asked.limits.pairs or asked.limits.cone else 1],
         options={"ftol": tolerance * tolerance, "maxiter": iterations},
     )
+
+
+def _solve(problem: Problem) -> Outcome:
+    asked = tension_problem(problem)
+    tolerance, iterations = float(problem.params[1]), int(problem.params[2])
+    z = np.concatenate([problem.shares, problem.directions.ravel()])
+    answer = minimise(asked, z, tolerance, iterations)
     return outcome_of(asked, np.asarray(answer.x), tolerance, int(answer.nit))
 
 

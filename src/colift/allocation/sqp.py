@@ -130,6 +130,7 @@ class Sqp(AllocatorPart):
     """The paper's problem: least squared tensions plus ``mu`` times squared cosines between cables."""
 
     kernel = _allocate
+    spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""

@@ -153,6 +153,7 @@ class WahbaHoenig(AllocatorPart):
 
     kernel = plain_kernel(_solve)
     needs = ("daqp", "qp")
+    spread_setting = ("distance", (0.2, 0.5, 0.8, 1.1))
 
     distance: Annotated[float, Field(gt=0.0, le=1e3)] = 0.5
     """Distance that the wedges keep between two drones above the load, m."""

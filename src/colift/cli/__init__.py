@@ -38,7 +38,11 @@ def _options(
     """Several multirotors carry one load on cables: allocate, control, simulate, judge."""
 
 
-_found = [module.name for module in pkgutil.iter_modules(__path__) if module.name != "base"]
+_found = [
+    module.name
+    for module in pkgutil.iter_modules(__path__)
+    if module.name not in ("base", "campaign")
+]
 for _name in sorted(_found, key=lambda name: ((*FIRST, name).index(name), name)):
     importlib.import_module(f"{__name__}.{_name}")
 

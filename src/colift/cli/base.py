@@ -77,8 +77,15 @@ def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
             temporary.write_text(text, encoding="utf-8")
     if report:
         from colift.report.html import write_report
+        from colift.viewer.data import payload
+        from colift.viewer.page import write_page
 
-        files["report"] = write_report(flown.recording, folder, metrics=flown.metrics)
+        label = flown.mission.kinds["allocation"]
+        data = payload([flown.recording], [flown.metrics], [label])
+        files["replay"] = write_page(folder / "replay.html", data)
+        files["report"] = write_report(
+            flown.recording, folder, metrics=flown.metrics, replay=files["replay"]
+        )
     return files
 
 
@@ -94,14 +101,14 @@ def numbers(text: str, least: int, most: int) -> list[int]:
 
 
 def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
-    """Print titled tables of text; the first and the last column may wrap."""
+    """Print titled tables of text; the first and the last column may wrap, a unit goes below its name."""
     for title, header, rows in tables:
         table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
         for k, name in enumerate(header):
             edge = k in (0, len(header) - 1)
             widest = max(len(row[k]) for row in rows) if edge else None
             table.add_column(
-                name, justify="left" if edge else "right", no_wrap=not edge,
+                name.replace(" (", "\n("), justify="left" if edge else "right", no_wrap=not edge,
                 min_width=widest and min(widest, 16),
             )  # fmt: skip
         for row in rows:
@@ -153,11 +160,11 @@ def progress(title: str) -> Iterator[Report]:
         yield lambda fraction: bar.update(task, completed=fraction)
 
 
-def new_folder(name: str) -> Path:
-    """Make ``runs/NAME-DATE-TIME``, numbered where flights of the same second would share it."""
+def new_folder(name: str, parent: Path = Path("runs")) -> Path:
+    """Make ``PARENT/NAME-DATE-TIME``, numbered where flights of the same second would share it."""
     stem = f"{_slug(name)}-{datetime.now():%Y%m%d-%H%M%S}"
-    folder, number = Path("runs") / stem, 1
-    folder.parent.mkdir(exist_ok=True)
+    folder, number = parent / stem, 1
+    parent.mkdir(parents=True, exist_ok=True)
     while True:
         try:
             folder.mkdir()

@@ -1,4 +1,4 @@
-"""`colift bench`: time the allocators and the closed loop."""
+"""`colift bench`: all solvers on the same problems, timed and judged."""
 
 from __future__ import annotations
 
@@ -7,30 +7,55 @@ from typing import Annotated
 
 import typer
 
-from colift.cli.base import Json, app, emit, loading, numbers, out, progress, save_json
+from colift.cli.base import (
+    Json,
+    app,
+    emit,
+    loading,
+    numbers,
+    out,
+    progress,
+    save_json,
+    show_tables,
+)
+from colift.threads import one_blas_thread
 
 
 @app.command()
 def bench(
     sizes: Annotated[
-        str, typer.Option(help="Numbers of drones, separated by commas.")
-    ] = "2,3,4,8,16,64,256,1024",
-    quick: Annotated[bool, typer.Option(help="Fewer repetitions; for a smoke test.")] = False,
+        str | None,
+        typer.Option(help="Numbers of drones, separated by commas; default: 2 to 1024."),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option(help="Fewer repetitions, up to 16 drones; for a smoke test.")
+    ] = False,
+    instructions: Annotated[
+        bool, typer.Option(help="Count the instructions of a call as well (needs valgrind).")
+    ] = False,
     file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Time the allocator and the closed loop on this machine; compare with SciPy's SLSQP.
+    """Time every solver that is installed on the same problems, and judge every answer alike.
 
-    Warm-up is excluded; median, 99th percentile and worst of many calls are shown, with the
-    iterations and the worst optimality residual, so that a fast wrong answer shows.
+    The paper's problem and the safe one, along a smooth and a noisy force. All take turns in one process;
+    warm-up is excluded. One referee looks at the answers alone, so that a fast wrong answer shows.
     """
-    counts = numbers(sizes, 1, 1024)
+    counts = None if sizes is None else numbers(sizes, 2, 1024)
+    one_blas_thread()
     with loading():
         from colift import benchmark
+        from colift.benchmark.tables import notes, tables
+    counts = counts or list(benchmark.QUICK_SIZES if quick else benchmark.SIZES)
     with progress("Timing") as advance:
-        result = benchmark.run(counts, quick=quick, progress=advance)
+        result = benchmark.run(
+            counts, effort=benchmark.QUICK if quick else benchmark.FULL, instructions=instructions,
+            progress=advance,
+        )  # fmt: skip
     save_json(file, result)
     if as_json:
         emit(result)
-    else:
-        benchmark.show(result, out)
+        return
+    show_tables(tables(result))
+    for note in notes(result):
+        out.print(note, highlight=False)

@@ -1,4 +1,4 @@
-"""Lost drones from two residuals: a cable that lengthens, a thrust that is not there."""
+"""Lost drones from residuals: a cable that lengthens, a thrust that is not there, numbers that stand still."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from colift.math import quaternion
 from colift.part import Places, Vector, carry_rows
 from colift.team import Team
 
-_HEAD = (
-    7  # params before the masses: filter, hold, speed, length, time to learn it, deficit, gravity
-)
-_SLOTS = 13
+# Parameters before the masses: filter, hold, speed, length, time to learn it, deficit, frozen, gravity.
+_HEAD = 8
+_SLOTS = 24
 _LENGTH, _DISTANCE, _SPEED, _V, _P, _CABLE, _THRUST = 1, 2, 3, 4, 7, 10, 11
-_NOW = 12  # whether the distance changes faster than that of a taut cable
+_STILL, _LAST = 12, 13  # time without any change; position, velocity, attitude
+_NOW = 23  # whether the distance changes faster than that of a taut cable
 
 
 @kernel(SIGNATURE)
@@ -28,7 +28,8 @@ def _judge(  # type: ignore[no-untyped-def]
     carrying,
 ):  # fmt: skip
     n = positions.shape[0]
-    tau, hold, fast, longer, learn, deficit, g = params[:_HEAD]
+    tau, hold, fast, longer = params[0], params[1], params[2], params[3]
+    learn, deficit, frozen, g = params[4], params[5], params[6], params[7]
     keep = math.exp(-dt / tau)
     moving = 0.0
     for i in range(n):
@@ -72,12 +73,24 @@ def _judge(  # type: ignore[no-untyped-def]
         memory[o + _CABLE] = memory[o + _CABLE] + dt if apart else 0.0
         weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
         memory[o + _THRUST] = memory[o + _THRUST] + dt if weak else 0.0
+
+        still = True
+        for k in range(10):
+            if k < 3:
+                value = positions[i, k]
+            elif k < 6:
+                value = velocities[i, k - 3]
+            else:
+                value = attitudes[i, k - 6]
+            still = still and value == memory[o + _LAST + k]
+            memory[o + _LAST + k] = value
+        memory[o + _STILL] = memory[o + _STILL] + dt if still else 0.0
     for i in range(n):
         o = _SLOTS * i
         # If most distances change, it is the load that is seen wrongly, or let go.
         if memory[o + _CABLE] >= hold and (n == 1 or 2.0 * moving <= n):
             carrying[i] = 0.0
-        if memory[o + _THRUST] >= hold:
+        if memory[o + _THRUST] >= hold or 0.0 < frozen <= memory[o + _STILL]:
             carrying[i] = 0.0
 
 
@@ -91,6 +104,9 @@ class Residuals(DetectionPart):
     Second: along its thrust, a drone's filtered acceleration is compared with what commanded thrust, wanted
     tension and weight would give (a momentum observer; De Luca and Mattone, ICRA 2005). Wind is part of the
     difference, so the deficit must be large.
+
+    Third, where asked for: a drone of which no number changes for a while is not measured any more. Noise never
+    repeats itself, but perfect sensors of a drone in balance may.
     """
 
     kernel = _judge
@@ -107,10 +123,12 @@ class Residuals(DetectionPart):
     """Time constant with which the cables' lengths are learned, s."""
     deficit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
     """Share of the commanded thrust that lacks."""
+    frozen: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    """Time for which nothing that is known of a drone changes, s; 0: not looked at."""
 
     def params(self, team: Team) -> Vector:
         head = [self.filter, self.hold, self.speed, self.length, self.learning, self.deficit]
-        return np.array([*head, team.gravity, *team.masses])
+        return np.array([*head, self.frozen, team.gravity, *team.masses])
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(_SLOTS * team.n)

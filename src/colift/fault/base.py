@@ -6,7 +6,7 @@ The changes go to the truth. Nobody tells the controllers: a ``detection`` part 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -44,8 +44,16 @@ class FaultPart(Part):
         """What it changes when it befalls this drone at this time."""
         raise NotImplementedError
 
-    def resolve(self, rng: np.random.Generator, n: int, duration: float) -> list[Change]:
-        """The changes of one flight with ``n`` drones."""
+    def drawn(self, rng: np.random.Generator, n: int, duration: float) -> Self:
+        """The same with the time and the drone that chance gives it in a flight with ``n`` drones."""
         when, who = float(rng.uniform(0.0, duration)), int(rng.integers(n))
         at = when if self.at == "random" else self.at
-        return list(self.changes(who if self.drone == "random" else self.drone, at))
+        drone = who if self.drone == "random" else self.drone
+        return self.model_copy(update={"at": at, "drone": drone})
+
+    def resolve(self, rng: np.random.Generator, n: int, duration: float) -> list[Change]:
+        """The changes of one flight with ``n`` drones."""
+        drawn = self.drawn(rng, n, duration)
+        assert not isinstance(drawn.at, str)
+        assert not isinstance(drawn.drone, str)
+        return list(drawn.changes(drawn.drone, drawn.at))

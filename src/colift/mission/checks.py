@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
 
 from colift.errors import Problem, UnknownNameError
 from colift.fault.base import FaultPart
-from colift.mission.schema import Frame, Section
-from colift.mission.wording import parse, problems_of
+from colift.mission.schema import Frame, Section, Timing
+from colift.mission.wording import parse, problems_of, shown
 from colift.part import Part, find
 from colift.simulation.loop import MAX_DISTURBANCES
 from colift.simulation.signals import columns
 
 MAX_RECORDING = 4e9
 """Bytes that a flight may record; it is held in memory."""
+
+
+def recorded_bytes(n: int, timing: Timing) -> float:
+    """Size of what a flight of n drones records."""
+    row = 8.0 * float(max(part.stop for part in columns(n).values()))
+    return timing.duration * (row / timing.recording + 80.0 / timing.allocation)
 
 
 def cross_checks(
@@ -39,22 +46,21 @@ def cross_checks(
             message = f"must be drones.count = {n}"
             yield Problem("start.directions", f"{len(given)} directions", message)
     if not broken & {"drones", "timing"}:
-        width = max(part.stop for part in columns(n).values())
-        size = 8.0 * width * timing.duration / timing.recording
-        size += 80.0 * timing.duration / timing.allocation
+        size = recorded_bytes(n, timing)
         if size > MAX_RECORDING:
             limit = f"{MAX_RECORDING / 1e9:g} GB; shorten timing.duration or lengthen the periods"
             yield Problem(
                 "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
             )
-    yield from _event_checks(frame, parts, broken)
+    yield from _event_checks(frame, dict(_with_paths(parts, lists)), broken)
     yield from _criteria_checks(frame)
-    if not broken & {"world", "load", "drones"}:
+    if not broken & {"world", "load", "drones", "truth"}:
         for path, part in _with_paths(parts, lists):
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
-            for field, message in part.check(frame.team):
+            team = frame.true_team if part.layer == "plant" else frame.team
+            for field, message in part.check(team):
                 yield Problem(f"{path}.{field}", "", message)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
@@ -103,23 +109,54 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
         if "timing" not in broken and event.at > timing.duration:
             message = f"must be within timing.duration = {timing.duration:g} s"
             yield Problem(f"events.{i}.at", f"{event.at:g}", message)
-        section, _, name = event.field.partition(".")
+        section, _, name = event.field.rpartition(".")
         if section == "drones":
             if "drones" not in broken:
                 yield from _team_change(f"events.{i}.value", name, event.value, left, n)
         elif section == "load":
-            yield from _setting_change(f"events.{i}", frame.load, section, name, event.value)
+            found = list(_setting_change(f"events.{i}", frame.load, section, name, event.value))
+            yield from found
+            if not found and not broken & {"world", "load", "drones", "truth"}:
+                team = replace(frame.true_team, load_mass=float(event.value))
+                for field, message in present["plant"].check(team) if "plant" in present else ():
+                    yield Problem(
+                        f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
+                    )
+        elif event.field in present:
+            yield from _section_change(f"events.{i}", event.field, event.value, present)
         elif event.field == "allocation.kind":
-            try:
-                present["allocation"] = find("allocation", str(event.value))()
-            except UnknownNameError as error:
-                yield Problem(f"events.{i}.value", repr(event.value), str(error))
+            yield from _section_change(f"events.{i}", section, {"kind": event.value}, present)
+        elif name == "kind":
+            message = f"to put another part in place give the whole section {section}"
+            yield Problem(f"events.{i}.field", event.field, message)
         elif section in present:
-            if name == "kind":
-                message = "only the allocator can be put in place of another in flight"
-                yield Problem(f"events.{i}.field", event.field, message)
-                continue
             yield from _setting_change(f"events.{i}", present[section], section, name, event.value)
+        elif event.field.startswith("disturbance."):
+            yield Problem(f"events.{i}.field", event.field, "there is no such section")
+
+
+def _section_change(
+    path: str, section: str, table: Any, present: dict[str, Part]
+) -> Iterable[Problem]:
+    """Mistakes of a part that takes the place of another, which is brought up to date."""
+    if not isinstance(table, dict) or "kind" not in table:
+        yield Problem(f"{path}.value", shown(table), f"{section} must be a table with a kind")
+        return
+    settings = dict(table)
+    try:
+        part = find(section.partition(".")[0], str(settings.pop("kind")))
+    except UnknownNameError as error:
+        yield Problem(f"{path}.value", shown(table["kind"]), str(error))
+        return
+    if section.startswith("disturbance.") and type(present[section]) is not part:
+        message = f"only a disturbance of the same kind can take the place of {section}"
+        yield Problem(f"{path}.value", shown(table["kind"]), message)
+        return
+    try:
+        present[section] = parse(part, settings)
+    except ValidationError as error:
+        for problem in problems_of(error, part, settings, section):
+            yield Problem(path, problem.value, f"{problem.path} {problem.message}")
 
 
 def _team_change(path: str, name: str, value: Any, left: set[int], n: int) -> Iterable[Problem]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, SerializeAsAny, Tag
@@ -194,9 +196,10 @@ class Timing(Section):
         return round(self.duration / self.step) + 1
 
 
+_CHANGING = "|".join(layer for layer in LAYERS if layer not in ("plant", "reference"))
 EVENT_FIELDS = (
-    r"^(load\.mass|drones\.(lose|join)"
-    rf"|({'|'.join(layer for layer in LAYERS if layer not in ('plant', 'reference'))})\.[a-z_]+)$"
+    r"^(load\.mass|drones\.(lose|join)|reference"
+    rf"|({_CHANGING}|disturbance\.[0-9]{{1,3}})(\.[a-z_]+)?)$"
 )
 
 
@@ -206,10 +209,11 @@ class Event(Section):
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
     field: Annotated[str, Field(pattern=EVENT_FIELDS)]
-    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, or a setting of a
-    layer such as ``allocation.mu``; ``allocation.kind`` puts another allocator, with its defaults, in place."""
+    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, a setting of a layer
+    or of a disturbance such as ``allocation.mu`` or ``disturbance.0.force``, or a whole section such as
+    ``reference``; ``allocation.kind`` puts another allocator, with its defaults, in place."""
     value: Any
-    """New value, in the field's unit; for ``drones.lose`` the number, from 0, of the drone whose cable is
+    """New value, in the field's unit; for a section a table with ``kind`` and settings; for ``drones.lose`` the number, from 0, of the drone whose cable is
     cut and that leaves the team, which is told at once; for ``drones.join`` the drone that hooks in then, in
     the widest gap between the cables, at the load's velocity, and that is not there before."""
 
@@ -301,6 +305,17 @@ class Frame(Section):
             return ring(len(drones), cone, heading=heading)
         given = np.array(self.start.directions, dtype=float)[drones]
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
+
+
+class RealFlight(Frame):
+    """What is known of a flight that colift did not fly: the team and the timing, no layers."""
+
+    kinds: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """No part of ours flew it."""
+
+    def resolved(self) -> dict[str, Any]:
+        """All that is known, as plain data."""
+        return self.model_dump(mode="json", exclude_none=True)
 
 
 class Mission(Frame):

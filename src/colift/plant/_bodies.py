@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.geometry import min_norm_tensions
 from colift.jit import inline, kernel
 from colift.math import quaternion
 from colift.part import Places, Vector, carry_rows
@@ -140,12 +141,20 @@ class BodiesPart(PlantPart):
         bodies = np.column_stack([team.masses, team.cable_lengths, team.inertias])
         return np.concatenate([[team.load_mass, team.gravity], bodies.ravel()])
 
+    def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Lengths (n,) of the cables under these tensions, m."""
+        return team.cable_lengths
+
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
+        """Memory at the start, with the cables as long as the tensions that hold the load make them."""
         memory = self.memory(team)
+        weight = [0.0, 0.0, team.load_mass * team.gravity]
+        tensions = np.maximum(min_norm_tensions(start.directions, weight), 0.0)
+        spans = self.stretched(team, tensions)[:, None] * start.directions
         memory[0:3] = start.load_position
         memory[3:LOAD] = start.load_velocity
         drones = memory[LOAD : state_size(team.n)].reshape(team.n, DRONE)
-        drones[:, 0:3] = start.load_position - team.cable_lengths[:, None] * start.directions
+        drones[:, 0:3] = start.load_position - spans
         drones[:, 3:6] = start.load_velocity
         drones[:, 6:10] = start.attitudes
         return memory

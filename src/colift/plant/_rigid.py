@@ -78,7 +78,7 @@ def lines(n, y, alpha, lengths):  # type: ignore[no-untyped-def]
 
 
 @inline
-def closing(n, y, alpha, params, b):  # type: ignore[no-untyped-def]
+def closing(n, y, alpha, b):  # type: ignore[no-untyped-def]
     """Velocities at which the load moves away from the drones, along the cables."""
     for i in range(n):
         o = LOAD + DRONE * i + 3
@@ -116,15 +116,21 @@ def derivative(n, y, thrusts, torques, external, held, params, T, alpha, b, dy):
 
 
 @inline
-def project(n, y, held, params, T, alpha, b):  # type: ignore[no-untyped-def]
-    """Pull the held drones back to their distance and the velocities across it; keep momentum."""
-    normalise(n, y)
-    lines(n, y, alpha, b)
+def tighten(n, y, held, params, T, alpha, b):  # type: ignore[no-untyped-def]
+    """Pull the held drones back to their distance; ``b`` holds the distances before."""
     for i in range(n):
         b[i] -= params[MASS + BODY * i + 1]
     solve(n, alpha, b, held, params, T)
     pull(n, alpha, T, params, 0, y)
+
+
+@inline
+def project(n, y, held, params, T, alpha, b):  # type: ignore[no-untyped-def]
+    """Pull the held drones back to their distance and the velocities across it; keep momentum."""
+    normalise(n, y)
     lines(n, y, alpha, b)
-    closing(n, y, alpha, params, b)
+    tighten(n, y, held, params, T, alpha, b)
+    lines(n, y, alpha, b)
+    closing(n, y, alpha, b)
     solve(n, alpha, b, held, params, T)
     pull(n, alpha, T, params, 3, y)

@@ -15,15 +15,34 @@ Source = TypeVar("Source", contravariant=True)
 
 
 class Entry(NamedTuple, Generic[Source]):
-    """One figure of the registry: its title, how to read it, and what draws it."""
+    """One figure of the registry: its title, how to read it, what draws it, and from what."""
 
     title: str
     caption: str
     draw: Callable[[Source], Figure]
+    needs: tuple[str, ...] = ()
+    """Signals without which there is nothing to draw."""
+    without: tuple[str, ...] = ()
+    """Signals with which another figure says more."""
+
+
+def drawable(recording: Recording) -> dict[str, Entry[Recording]]:
+    """The figures of what this flight has recorded."""
+    return {
+        name: entry
+        for name, entry in FIGURES.items()
+        if recording.measured(*entry.needs)
+        and not (entry.without and recording.measured(*entry.without))
+    }
 
 
 def register(
-    table: dict[str, Entry[Source]], title: str, caption: str
+    table: dict[str, Entry[Source]],
+    title: str,
+    caption: str,
+    *,
+    needs: tuple[str, ...] = (),
+    without: tuple[str, ...] = (),
 ) -> Callable[[Callable[[Source], Figure]], Callable[[Source], Figure]]:
     """Enter the decorated function, which from then on draws in the common style."""
 
@@ -33,7 +52,7 @@ def register(
             with style.look():
                 return function(source)
 
-        table[function.__name__] = Entry(title, caption, draw)
+        table[function.__name__] = Entry(title, caption, draw, needs, without)
         return draw
 
     return enter
@@ -62,6 +81,7 @@ def path(recording: Recording) -> Figure:
     "Position error",
     "The load's position less its reference, by component. The grey band is plus and minus the "
     "distance between the two, so it touches whatever component carries the whole error.",
+    needs=("reference",),
 )
 def position_error(recording: Recording) -> Figure:
     return _over_time(recording, panels.position_error)
@@ -73,9 +93,22 @@ def position_error(recording: Recording) -> Figure:
     "Actual tension of each cable. Lines on top of each other mean an evenly shared load; "
     'a line below zero means a cable that would be slack. A note "off scale" gives the whole range '
     "where short peaks leave the axis.",
+    needs=("tensions",),
 )
 def tensions(recording: Recording) -> Figure:
     return _over_time(recording, panels.tensions)
+
+
+@register(
+    FIGURES,
+    "Wanted tensions",
+    "Tension that the allocator wanted of each cable. The actual ones were not measured. "
+    'A note "off scale" gives the whole range where short peaks leave the axis.',
+    needs=("desired_tensions",),
+    without=("tensions",),
+)
+def wanted_tensions(recording: Recording) -> Figure:
+    return _over_time(recording, panels.wanted_tensions)
 
 
 @register(
@@ -84,6 +117,7 @@ def tensions(recording: Recording) -> Figure:
     "Angle between every two actual cables; each line carries the colours of its two drones. "
     "Drones come close where an angle falls below the dashed line at 30 degrees. More than ten "
     "pairs are drawn as the range of all pairs, that of nearest neighbours, and the closest pair.",
+    needs=("directions",),
 )
 def angles(recording: Recording) -> Figure:
     return _over_time(recording, panels.angles)
@@ -94,6 +128,7 @@ def angles(recording: Recording) -> Figure:
     "Wanted and actual tension",
     "Above: actual tensions, with those that the allocator wanted dashed in black. Below: actual "
     "less wanted tension, that is what the controllers did not follow.",
+    needs=("tensions", "desired_tensions"),
 )
 def tension_tracking(recording: Recording) -> Figure:
     return _over_time(recording, panels.desired_tensions, panels.tension_error, height=1.75)
@@ -104,6 +139,7 @@ def tension_tracking(recording: Recording) -> Figure:
     "Time of the allocator",
     "How long one allocation took, measured in the loop; both axes are logarithmic. Rare "
     "slow ones are usually interruptions by the operating system.",
+    needs=("allocator_time",),
 )
 def allocator_time(recording: Recording) -> Figure:
     figure, (axes,) = style.grid()

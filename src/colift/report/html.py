@@ -1,4 +1,7 @@
-"""Pages of one file: no script, no request, dark and light, wide and narrow."""
+"""Pages of one file: no script, no request, dark and light, wide and narrow.
+
+The page of a flight may show a replay, which is a page of its own beside it.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +31,7 @@ font:1rem/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-seri
 overflow-wrap:break-word}
 h1{font-size:1.7rem;line-height:1.25;margin:0 0 .4rem}
 h2{font-size:1.15rem;margin:2.6rem 0 .7rem}
+h3{font-size:1rem;margin:1.6rem 0 .4rem}
 p{margin:.5rem 0}
 .soft,figcaption,th{color:var(--soft)}
 .facts{display:flex;flex-wrap:wrap;gap:.35rem .5rem;padding:0;margin:1rem 0;list-style:none;
@@ -39,13 +43,18 @@ border-radius:.25rem;margin:1.2rem 0;font-weight:600}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
 th{text-align:left;font-weight:600;font-size:.82rem}
-th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule);vertical-align:top}
+th,td{padding:.4rem .9rem .4rem 0;border-bottom:1px solid var(--rule)}
+td{vertical-align:top}
 th:last-child,td:last-child{padding-right:0}
-.number{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
+.number{text-align:right;font-variant-numeric:tabular-nums}
+td.number,.name{white-space:nowrap}
+th{vertical-align:bottom}
 code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,"DejaVu Sans Mono",monospace}
 td code{color:var(--soft)}
 figure{margin:0 0 2.2rem}
 figure .scroll{background:#fff;border:1px solid var(--rule);border-radius:.4rem;padding:.5rem}
+iframe{display:block;width:100%;aspect-ratio:16/10;min-height:30rem;border:1px solid var(--rule);
+border-radius:.4rem}
 figure svg,figure img{display:block;width:100%;height:auto;min-width:30rem}
 figcaption{font-size:.9rem;margin-top:.5rem}
 figcaption b{color:var(--ink)}
@@ -107,13 +116,28 @@ def figure(drawing: Drawing) -> str:
     )
 
 
+def frame(file: str) -> str:
+    """The replay in a frame that runs its scripts and may do nothing else, and a link to it alone."""
+    name = escape(file)
+    return (
+        f'<h2>Replay</h2>\n<iframe src="{name}" title="Replay in 3D" loading="lazy" '
+        'sandbox="allow-scripts"></iframe>\n'
+        f'<p class="soft">The frame shows <a href="{name}">{name}</a>, which must stand beside '
+        "this page.</p>"
+    )
+
+
 def details(summary: str, text: str) -> str:
     """Preformatted text that opens on demand."""
     return f"<details><summary>{escape(summary)}</summary><pre>{escape(text)}</pre></details>"
 
 
 def write_report(
-    source: Run | Recording, folder: str | Path, *, metrics: Mapping[str, float]
+    source: Run | Recording,
+    folder: str | Path,
+    *,
+    metrics: Mapping[str, float],
+    replay: Path | None = None,
 ) -> Path:
     """Write ``report.html`` and ``figures/<name>.png`` and ``.svg`` of one flight.
 
@@ -125,31 +149,38 @@ def write_report(
         Created if missing; files of the same name are replaced, each only by a whole one.
     metrics : mapping
         As from :func:`colift.metrics.compute`.
+    replay : path, optional
+        Page of the viewer in the same folder, shown in a frame.
 
     Returns
     -------
     Path
-        The page; it needs none of the other files. Equal recordings give equal bytes.
+        The page; it needs no other file but ``replay``. Equal recordings give equal bytes.
 
     """
-    from colift.report.figures import FIGURES
+    from colift.report.figures import drawable
     from colift.report.render import draw
 
     recording = source if isinstance(source, Recording) else source.recording
     folder = Path(folder)
-    drawings = draw(FIGURES, recording)
+    drawings = draw(drawable(recording), recording)
     for drawing in drawings:
         drawing.save(folder / "figures")
     target = folder / "report.html"
     with atomic_path(target) as temporary:
-        temporary.write_text(report(recording, metrics, drawings), encoding="utf-8", newline="\n")
+        text = report(recording, metrics, drawings, replay.name if replay else None)
+        temporary.write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
-def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequence[Drawing]) -> str:
-    """The page of one flight."""
+def report(
+    recording: Recording,
+    metrics: Mapping[str, float],
+    drawings: Sequence[Drawing],
+    replay: str | None = None,
+) -> str:
+    """The page of one flight; ``replay`` is the file beside it that replays the flight."""
     mission = recording.mission
-    kinds = ", ".join(f"{layer} {kind}" for layer, kind in mission.kinds.items())
     versions = "\n".join(f"{name:9} {text}" for name, text in recording.versions.items())
     parts = [
         f"<header><h1>{escape(mission.name)}</h1>",
@@ -159,27 +190,53 @@ def report(recording: Recording, metrics: Mapping[str, float], drawings: Sequenc
             [
                 f"{recording.n} drone{'s' * (recording.n != 1)}",
                 f"load {mission.load.mass:g} kg",
-                f"{mission.timing.duration:g} s",
-                f"reference {mission.kinds['reference']}",
-                f"allocator {mission.kinds['allocation']}",
-                f"seed {mission.seed}",
+                f"{mission.timing.duration:.4g} s",
+                *_flown_by(recording),
                 f"colift {recording.versions.get('colift', '?')}",
             ]
         ),
         criteria_table(judge(recording, metrics)),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
+        frame(replay) if replay else "",
         "<h2>Figures</h2>",
         *map(figure, drawings),
         "<h2>Provenance</h2>",
-        f'<p class="soft">Parts: {escape(kinds)}. Seed {mission.seed}.</p>',
-        details(
-            "Mission as flown, every default filled in (a valid mission file)",
-            tomli_w.dumps(mission.resolved()),
-        ),
+        *_provenance(recording),
         details("Versions", versions),
     ]
     return page(f"{mission.name} - colift", "\n".join(part for part in parts if part))
+
+
+def _flown_by(recording: Recording) -> list[str]:
+    """Short facts on what flew."""
+    mission = recording.mission
+    if recording.source == "flight":
+        return ["real flight", f"{len(recording.time)} rows"]
+    return [
+        f"reference {mission.kinds['reference']}",
+        f"allocator {mission.kinds['allocation']}",
+        f"seed {mission.seed}",
+    ]
+
+
+def _provenance(recording: Recording) -> list[str]:
+    """Where the numbers come from: the mission and its parts, or the logs of a real flight."""
+    mission = recording.mission
+    resolved = tomli_w.dumps(mission.resolved())
+    if recording.source == "flight":
+        text = "Logs of a real flight. What they do not hold is unknown, and not shown."
+        logs = tomli_w.dumps({k: v for k, v in recording.provenance.items() if v is not None})
+        return [
+            f'<p class="soft">{text}</p>',
+            details("Logs, assumptions and what was inferred", logs),
+            details("Team and timing", resolved),
+        ]
+    kinds = ", ".join(f"{layer} {kind}" for layer, kind in mission.kinds.items())
+    return [
+        f'<p class="soft">Parts: {escape(kinds)}. Seed {mission.seed}.</p>',
+        details("Mission as flown, every default filled in (a valid mission file)", resolved),
+    ]
 
 
 def criteria_table(judged: Sequence[Judgement]) -> str:
@@ -198,20 +255,23 @@ def criteria_table(judged: Sequence[Judgement]) -> str:
 
 
 def metrics_table(metrics: Mapping[str, float]) -> str:
-    """Every metric with its meaning, value and unit."""
-    rows = []
+    """Every metric with its meaning, value and unit; those without a value are only named."""
+    rows, missing = [], []
     for metric in all_metrics():
-        if metric.name in metrics:
+        if math.isnan(metrics.get(metric.name, 0.0)):
+            missing.append(f"<code>{escape(metric.name)}</code>")
+        elif metric.name in metrics:
             value, unit = quantity(metrics[metric.name], metric.unit)
             meaning = metric.meaning[:1].upper() + metric.meaning[1:]
             rows.append((f"{escape(meaning)}<br><code>{escape(metric.name)}</code>", value, unit))
-    return table(("Quantity", "Value", "Unit"), rows, numbers=(1,))
+    text = table(("Quantity", "Value", "Unit"), rows, numbers=(1,))
+    if missing:
+        text += f'<p class="soft">Not measured, or does not apply: {", ".join(missing)}.</p>'
+    return text
 
 
 def quantity(value: float, unit: str) -> tuple[str, str]:
     """A value and its unit for reading: lengths below a metre in cm, no unit for pure numbers."""
-    if math.isnan(value):
-        return "does not apply", ""
     if unit == "m" and abs(value) < 1.0:
         value, unit = 100.0 * value, "cm"
     return f"{value:.4g}", {"1": "", "us": "µs", "deg": "°"}.get(unit, unit)

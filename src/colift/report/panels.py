@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
@@ -175,6 +174,14 @@ def tensions(axes: Axes, recording: Recording) -> Array:
     return flight["tensions"]
 
 
+def wanted_tensions(axes: Axes, recording: Recording) -> Array:
+    """Wanted tensions, N."""
+    flight = intact(recording)
+    per_drone(axes, flight.time, flight["desired_tensions"])
+    axes.set_ylabel("wanted tension (N)")
+    return flight["desired_tensions"]
+
+
 def desired_tensions(axes: Axes, recording: Recording) -> Array:
     """Actual tensions, N, with the wanted ones dashed on top (their mean if they are many)."""
     tensions(axes, recording)
@@ -305,10 +312,8 @@ def allocator_time(axes: Axes, recording: Recording) -> None:
     axes.set_xlim(low, high)
     axes.set_ylim(0.5, 2.0 * counts.max())
     fine = (1.0, 2.0, 5.0) if high < 500.0 * low else (1.0,)
-    for axis, steps in ((axes.xaxis, fine), (axes.yaxis, (1.0,))):
-        axis.set_major_locator(LogLocator(subs=steps))
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.set_minor_locator(NullLocator())
+    style.plain_ticks(axes.xaxis, fine)
+    style.plain_ticks(axes.yaxis)
 
 
 def path(axes: Any, recording: Recording) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
 PALETTE = (
     "#0072B2",
@@ -132,13 +134,16 @@ def grid(
     height: float = 2.3,
     titles: bool = False,
     share: bool = True,
+    legend_rows: int = 1,
+    left: float = LEFT,
 ) -> tuple[Figure, list[Axes]]:
     """A white figure with ``rows`` x ``columns`` axes, each ``height`` inches high, row by row.
 
-    Margins are fixed in inches: room for labels left and below, for one line of legend on top and,
+    Margins are fixed in inches: room for labels left and below, for the legend's lines on top and,
     if asked, for titles above the axes. With ``share``, the panels of a row have one vertical axis.
     """
-    left, right, bottom, top, gap = LEFT, 0.22, 0.48, 0.36 + 0.24 * titles, 0.16
+    right, bottom, gap = 0.22, 0.48, 0.16
+    top = 0.16 + 0.2 * legend_rows + 0.24 * titles
     between = 0.2 if share else 0.75
     total = top + rows * height + (rows - 1) * gap + bottom
     width = (WIDTH - left - right - (columns - 1) * between) / columns
@@ -160,8 +165,8 @@ def grid(
     return figure, axes
 
 
-def legend(figure: Figure) -> None:
-    """One line of legend on top of the figure, clear of every line: each label of any axes once."""
+def legend(figure: Figure, rows: int = 1) -> None:
+    """The legend on top of the figure, clear of every line: each label of any axes once."""
     found: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -172,8 +177,17 @@ def legend(figure: Figure) -> None:
             list(found),
             loc="upper left",
             bbox_to_anchor=(LEFT / WIDTH, 1.0 - 0.09 / figure.get_figheight()),
-            ncols=len(found),
+            ncols=-(-len(found) // rows),
             **(
-                {"fontsize": 8, "columnspacing": 0.8, "handlelength": 1.3} if len(found) > 8 else {}
+                {"fontsize": 8, "columnspacing": 0.8, "handlelength": 1.3}
+                if len(found) > 8 * rows
+                else {}
             ),
         )
+
+
+def plain_ticks(axis: Axis, steps: Sequence[float] = (1.0,)) -> None:
+    """Numbers as they are spoken at these multiples of the powers of ten, and nothing between."""
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())

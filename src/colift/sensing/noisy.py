@@ -212,7 +212,8 @@ class Noisy(SensingPart):
 
     def _slots(self, sensor: str) -> int:
         """Samples on their way at once: those of the delay, the first of all, and one to spare."""
-        delay, period = getattr(self, f"{sensor}_delay"), getattr(self, f"{sensor}_period")
+        delay: float = getattr(self, f"{sensor}_delay")
+        period: float = getattr(self, f"{sensor}_period")
         return math.ceil(delay / period) + 2
 
     def params(self, team: Team) -> Vector:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from colift.errors import ColiftError
 from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.mission.schema import Event, Mission
-from colift.part import LAYERS, Part, Vector, find
+from colift.part import LAYERS, Part, Vector, make
 from colift.plant.base import Start
 from colift.recording import Recording
 from colift.reference.descent import Descent
@@ -125,10 +126,21 @@ class Flight:
         """Fly on for ``duration`` (s), to the nearest physics step, past the mission's end if need be."""
         self._fly_to(self._step + round(duration / self._every.step))
 
+    @property
+    def parts(self) -> dict[str, Part]:
+        """The parts that fly now, by section: a layer's name, or ``disturbance.0``."""
+        return {**self._parts, **{f"disturbance.{k}": p for k, p in self._disturbances.items()}}
+
+    @property
+    def load_mass(self) -> float:
+        """The true mass of the load now, kg."""
+        return self._load_mass
+
     def change(self, path: str, value: Any) -> None:
         """Set a setting from now on: ``allocation.mu``, ``load.mass`` (the truth's), ``disturbance.0.force``.
 
-        ``allocation.kind`` puts another allocator, with its default settings, in place.
+        A section, such as ``reference``, takes a table with the ``kind`` and the settings of the part to put in
+        place; ``allocation.kind`` puts another allocator, with its default settings, in place.
 
         Raises
         ------
@@ -138,31 +150,50 @@ class Flight:
             For a path that is not there, or a setting that cannot change in flight.
 
         """
-        leg = self._legs[-1]
-        section, _, name = path.partition(".")
+        section, _, name = path.rpartition(".")
         if path == "load.mass":
+            leg = self._legs[-1]
             self._load_mass = float(value)
             leg.params.plant[:] = self.mission.plant.params(self._true_team(leg.drones))
         elif path == "allocation.kind":
-            self._parts["allocation"] = find("allocation", value)()
-            self.regroup(self.drones, anew={"allocation"})
-        elif section == "disturbance":
-            number, _, name = name.partition(".")
-            if not number.isdecimal() or int(number) not in self._disturbances:
-                raise ColiftError(f"{path}: there is no such disturbance")
-            place = list(self._disturbances).index(int(number))
-            disturbance = _with(self._disturbances[int(number)], name, value)
-            packed = disturbance.of(leg.drones).params(leg.team)
-            _refill(leg.disturbances.params[place], packed, path)
-            self._disturbances[int(number)] = disturbance
-        elif section in self._parts and section != "plant":
-            part = _with(self._parts[section], name, value)
-            if part.memory(leg.team).shape != getattr(leg.memory, section).shape:
-                raise ColiftError(f"{path}: cannot change in flight")
-            _refill(getattr(leg.params, section), part.of(leg.drones).params(leg.team), path)
-            self._parts[section] = part
+            self.replace("allocation", make("allocation", {"kind": value}))
+        elif path in self.parts:
+            self.replace(path, make(path.partition(".")[0], value))
+        elif section in self.parts:
+            self.replace(section, _with(self.parts[section], name, value))
         else:
             raise ColiftError(f"{path}: there is no such setting")
+
+    def replace(self, section: str, part: Part) -> None:
+        """Put a part in place of that of a section (:attr:`parts`); one of the same kind goes on with its memory.
+
+        Raises
+        ------
+        ColiftError
+            For the plant; for a disturbance of another kind; for a setting that cannot change in flight.
+
+        """
+        leg, before = self._legs[-1], self.parts[section]
+        same = type(part) is type(before)
+        packed = part.of(leg.drones).params(leg.team)
+        if section.startswith("disturbance."):
+            if not same:
+                raise ColiftError(f"{section}: only one of the same kind can take its place")
+            assert isinstance(part, DisturbancePart)
+            number = int(section.partition(".")[2])
+            place = list(self._disturbances).index(number)
+            _refill(leg.disturbances.params[place], packed, section)
+            self._disturbances[number] = part
+        elif section == "plant":
+            raise ColiftError("plant: cannot change in flight")
+        elif same:
+            if part.memory(leg.team).shape != getattr(leg.memory, section).shape:
+                raise ColiftError(f"{section}: cannot change like this in flight")
+            _refill(getattr(leg.params, section), packed, section)
+            self._parts[section] = part
+        else:
+            self._parts[section] = part
+            self.regroup(self.drones, anew={section})
 
     def regroup(self, drones: list[int], anew: set[str] | None = None) -> None:
         """Go on with these drones: who is missing has its cable cut, who is new hangs on a taut one.
@@ -201,35 +232,60 @@ class Flight:
                 now[:] = before
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
 
-    def recording(self) -> Recording:
-        """What has been recorded so far; NaN for a drone that has left."""
+    def recording(self, since: float = 0.0) -> Recording:
+        """What has been recorded, from ``since`` (s) on; NaN for a drone that has left."""
         every, n = self._every, self.mission.drones.count
-        rows = -(-self._step // every.recording)
+        begin = max(self._legs[0].begin, round(since / every.step))
+        first, rows = -(-begin // every.recording), _due_rows(begin, self._step, every.recording)
         arrays = {s.name: np.full((rows, *s.shape_for(n)), np.nan) for s in SIGNALS}
-        begin = 0
+        cycles = []
+        filled = 0
         for leg in self._legs:
-            log = np.concatenate(leg.log) if leg.log else np.zeros((0, leg.bus.row.size))
-            end = begin + len(log)
+            log, answers = leg.recorded(begin, every)
+            cycles.append(answers)
+            end = filled + len(log)
             where = columns(leg.team.n)
             for s in SIGNALS:
                 values = log[:, where[s.name]].reshape(len(log), *s.shape_for(leg.team.n))
                 if s.shape[0] == "n":
-                    arrays[s.name][begin:end, leg.drones] = values
+                    arrays[s.name][filled:end, leg.drones] = values
                 elif s.shape[0] == "n+1":
-                    arrays[s.name][begin:end, [*leg.drones, n]] = values
+                    arrays[s.name][filled:end, [*leg.drones, n]] = values
                 else:
-                    arrays[s.name][begin:end] = values
-            begin = end
-        cycles = np.concatenate([block for leg in self._legs for block in leg.cycles])
+                    arrays[s.name][filled:end] = values
+            filled = end
+        allocations = np.concatenate(cycles)
         for k, signal in enumerate(CYCLE_SIGNALS):
-            arrays[signal.name] = cycles[:, k]
+            arrays[signal.name] = allocations[:, k]
+        first_cycle = -(-begin // every.allocation)
         return Recording(
             mission=self.mission,
-            time=np.arange(rows, dtype=np.float64) * (every.recording * every.step),
-            cycle_time=np.arange(len(cycles), dtype=np.float64) * (every.allocation * every.step),
+            time=np.arange(first, first + rows, dtype=np.float64) * (every.recording * every.step),
+            cycle_time=np.arange(first_cycle, first_cycle + len(allocations), dtype=np.float64)
+            * (every.allocation * every.step),
             arrays=arrays,
             outcome=(self.descent or self.outcome) if self.outcome == "completed" else self.outcome,
         )
+
+    @property
+    def bytes_per_second(self) -> float:
+        """What is recorded in a second of flight."""
+        every = self._every
+        row, cycle = self.bus.row.size / every.recording, CYCLE_WIDTH / every.allocation
+        return 8.0 * (row + cycle) / every.step
+
+    @property
+    def last_allocations(self) -> NDArray[np.float64]:
+        """Of the last stretch flown: (allocations, as in :data:`CYCLE_SIGNALS`)."""
+        stretches = self._legs[-1].stretches
+        return stretches[-1].cycles if stretches else np.zeros((0, CYCLE_WIDTH))
+
+    def forget(self, before: float) -> None:
+        """Drop what was recorded in stretches that ended by a time (s)."""
+        step = round(before / self._every.step)
+        for leg in self._legs:
+            leg.forget(step)
+        self._legs = [leg for leg in self._legs[:-1] if leg.stretches] + self._legs[-1:]
 
     def _fly_to(self, stop: int) -> None:
         """Fly to a step; on the way apply what is due, and regroup when a drone is judged lost."""
@@ -244,11 +300,11 @@ class Flight:
                 lost = [d for d, ok in zip(leg.drones, leg.bus.carrying, strict=True) if not ok]
                 self.found += [(self.time, drone) for drone in lost]
                 if len(lost) < len(leg.drones):
-                    self._lose(lost)
+                    self.lose(lost)
                 else:
                     self.outcome = f"no drone left to carry at t = {self.time:g} s"
 
-    def _lose(self, lost: list[int]) -> None:
+    def lose(self, lost: list[int]) -> None:
         """Go on without these drones; if the others cannot hold the load in hover, bring it down."""
         rest = [drone for drone in self.drones if drone not in lost]
         if not self.descent and (reason := self._cannot_carry(rest)):
@@ -280,8 +336,9 @@ class Flight:
             leg.params, leg.memory, self._info, leg.bus, log, cycles,
         )  # fmt: skip
         self.loop_time += time.perf_counter() - begin
-        leg.log.append(log[: _due_rows(self._step, reached, every.recording)])
-        leg.cycles.append(cycles[: _due_rows(self._step, reached, every.allocation)])
+        log = log[: _due_rows(self._step, reached, every.recording)]
+        cycles = cycles[: _due_rows(self._step, reached, every.allocation)]
+        leg.stretches.append(_Stretch(self._step, reached, log, cycles))
         self._step = reached
 
     def _apply(self, due: Event | Change) -> None:
@@ -300,7 +357,7 @@ class Flight:
             np.copyto(signal, value, where=~np.isnan(value))
         elif due.field == "drones.lose":
             if due.value in drones and len(drones) > 1:
-                self._lose([due.value])
+                self.lose([due.value])
         elif due.field == "drones.join":
             self.regroup(sorted([*drones, due.value]))
         else:
@@ -335,6 +392,7 @@ class Flight:
                 disturbances=Disturbances.of(disturbances),
                 params=Vectors(**params),
                 memory=Vectors(**memory),
+                begin=self._step,
             )
         )
 
@@ -342,7 +400,16 @@ class Flight:
         return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
 
 
-@dataclass(frozen=True)
+class _Stretch(NamedTuple):
+    """What the steps ``first <= k < stop`` recorded."""
+
+    first: int
+    stop: int
+    log: NDArray[np.float64]
+    cycles: NDArray[np.float64]
+
+
+@dataclass
 class _Leg:
     """A stretch of the flight with the same drones and parts, what the loop needs, what it recorded."""
 
@@ -354,8 +421,28 @@ class _Leg:
     disturbances: Disturbances
     params: Vectors
     memory: Vectors
-    log: list[NDArray[np.float64]] = field(default_factory=list)
-    cycles: list[NDArray[np.float64]] = field(default_factory=list)
+    begin: int
+    stretches: deque[_Stretch] = field(default_factory=deque)
+
+    def recorded(
+        self, begin: int, every: Periods
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rows of the log and allocations due from a step on."""
+        found = [each for each in self.stretches if each.stop > begin]
+        if not found:
+            return np.zeros((0, self.bus.row.size)), np.zeros((0, CYCLE_WIDTH))
+        log = np.concatenate([each.log for each in found])
+        cycles = np.concatenate([each.cycles for each in found])
+        first = found[0].first
+        if first >= begin:
+            return log, cycles
+        rows, allocations = every.recording, every.allocation
+        return log[_due_rows(first, begin, rows) :], cycles[_due_rows(first, begin, allocations) :]
+
+    def forget(self, before: int) -> None:
+        """Drop the stretches that ended by a step."""
+        while self.stretches and self.stretches[0].stop <= before:
+            self.begin = self.stretches.popleft().stop
 
 
 def timetable(mission: Mission) -> list[tuple[int, Event | Change]]:

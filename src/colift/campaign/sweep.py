@@ -1,0 +1,144 @@
+"""The campaign behind ``colift sweep``: one mission over values of its fields and over seeds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colift.campaign.plan import Case, Label, variation
+from colift.errors import MissionError, Problem
+from colift.mission.load import parse_override
+
+MAX_VALUES = 10_000
+"""Most values of one field."""
+
+
+@dataclass(frozen=True)
+class Over:
+    """A field of the mission by dotted path, and the values that it takes."""
+
+    path: str
+    values: tuple[Any, ...]
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """The values as they are written into results: lists as text."""
+        return tuple(v if isinstance(v, str | int | float) else str(v) for v in self.values)
+
+    @property
+    def numeric(self) -> bool:
+        return all(type(value) in (int, float) for value in self.values)
+
+
+def parse_over(text: str) -> Over:
+    """``PATH=LOW:HIGH:COUNT``, the same with ``:log`` behind it, or ``PATH=VALUE,VALUE,...``.
+
+    Raises
+    ------
+    MissionError
+        If it is none of these.
+
+    """
+    path, separator, given = (part.strip() for part in text.partition("="))
+    if not path or not separator or not given:
+        raise _wrong(text, "must have the form PATH=LOW:HIGH:COUNT[:log] or PATH=VALUE,VALUE,...")
+    if ":" not in given:
+        values = [parse_override(f"{path}={value}")[1] for value in _split(given)]
+        return Over(path, tuple(dict.fromkeys(map(_hashable, values))))
+    try:
+        low, high, count, *scale = given.split(":")
+        first, last, number = float(low), float(high), int(count)
+    except ValueError:
+        message = "must be LOW:HIGH:COUNT: two numbers and a whole one"
+        raise _wrong(text, message) from None
+    if scale not in ([], ["log"]) or not (math.isfinite(first) and math.isfinite(last)):
+        raise _wrong(text, "must have the form PATH=LOW:HIGH:COUNT or PATH=LOW:HIGH:COUNT:log")
+    if not 2 <= number <= MAX_VALUES:
+        raise _wrong(text, f"COUNT must be between 2 and {MAX_VALUES}")
+    if scale and min(first, last) <= 0.0:
+        raise _wrong(text, "LOW and HIGH must be greater than 0 on a logarithmic scale")
+    points = (np.geomspace if scale else np.linspace)(first, last, number)
+    return Over(path, tuple(float(f"{value:.12g}") for value in points))
+
+
+def _split(text: str) -> Iterable[str]:
+    """At commas, but not at those within brackets."""
+    depth, begin = 0, 0
+    for k, character in enumerate(text):
+        depth += (character in "[{") - (character in "]}")
+        if character == "," and depth == 0:
+            yield text[begin:k]
+            begin = k + 1
+    yield text[begin:]
+
+
+def _hashable(value: Any) -> Any:
+    return tuple(map(_hashable, value)) if isinstance(value, list) else value
+
+
+def _wrong(text: str, message: str) -> MissionError:
+    return MissionError("--over", [Problem(text, "", message)])
+
+
+def cases(
+    mission: str | Path, overs: Sequence[Over], seeds: int, changes: Mapping[str, Any]
+) -> list[Case]:
+    """Every combination of values, times seeds; ``changes`` are made in all of them."""
+    found = []
+    for seed in range(seeds):
+        choices = [zip(over.values, over.labels, strict=True) for over in overs]
+        for choice in itertools.product(*choices):
+            values = {over.path: value for over, (value, _) in zip(overs, choice, strict=True)}
+            labels = {over.path: label for over, (_, label) in zip(overs, choice, strict=True)}
+            given = {**variation(mission, seed), **changes, **values}
+            found.append(Case({**labels, "seed": seed}, mission, given))
+    return found
+
+
+METRICS = {
+    "tracking_rms_m": "tracking",
+    "min_angle_deg": "least angle",
+    "usual_angle_deg": "usual angle",
+    "mean_total_tension_N": "tension",
+    "slack_time_s": "slack",
+}
+"""The metrics of tables and figure, and how they are called there; the file holds all."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """The flights of one combination of values.
+
+    ``spread`` holds mean, least and largest of each metric over the seeds that were flown to the end.
+    """
+
+    values: tuple[Any, ...]
+    flights: int
+    completed: int
+    spread: Mapping[str, tuple[float, float, float]]
+
+
+def points(rows: Sequence[Mapping[str, Any]], overs: Sequence[Over]) -> list[Point]:
+    """One summary a combination of values, in the order flown."""
+    grouped: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        grouped.setdefault(tuple(row[over.path] for over in overs), []).append(row)
+    found = []
+    for values, flights in grouped.items():
+        good = [row for row in flights if row["outcome"] == "completed"]
+        spread = {name: _spread([float(row[name]) for row in good]) for name in METRICS}
+        found.append(Point(values, len(flights), len(good), spread))
+    return found
+
+
+def _spread(values: Sequence[float]) -> tuple[float, float, float]:
+    known = [value for value in values if not math.isnan(value)]
+    if not known:
+        return math.nan, math.nan, math.nan
+    return sum(known) / len(known), min(known), max(known)

@@ -1,0 +1,110 @@
+"""What the commands that run campaigns share: options, progress, exports."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bar
+
+from colift.cli.base import err, out
+
+if TYPE_CHECKING:
+    from colift.campaign.engine import Outcome, Progress
+
+FILE = "campaign.sqlite"
+"""Name of the file of results in a command's folder."""
+
+Seeds = Annotated[
+    int,
+    typer.Option(
+        min=1, max=100_000,
+        help="Flights of each case: the first starts as the mission says, others a little off.",
+    ),
+]  # fmt: skip
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, max=1024, help="Processes on this machine.", show_default="one a core"),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Fly on the workers of this Dask scheduler instead."),
+]
+RetryFailed = Annotated[bool, typer.Option("--retry-failed", help="Fly again what failed before.")]
+KeepRecordings = Annotated[
+    bool, typer.Option("--recordings", help="Keep the recording of every new flight as well.")
+]
+Csv = Annotated[
+    Path | None, typer.Option("--csv", metavar="FILE", help="Write one row a flight as CSV.")
+]
+Parquet = Annotated[
+    Path | None,
+    typer.Option("--parquet", metavar="FILE", help="Write one row a flight as Parquet."),
+]
+
+
+@contextmanager
+def flights(title: str) -> Iterator[Callable[[Progress], None]]:
+    """A bar of flights with the time they still take, on a terminal; silent elsewhere."""
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
+    )  # fmt: skip
+    with Bar(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+        task = bar.add_task(escape(title), total=None, left="")
+
+        def show(now: Progress) -> None:
+            left = f"about {duration(now.remaining)} left" if now.remaining > 0.0 else ""
+            failed = f", {now.failed} failed" if now.failed else ""
+            bar.update(task, completed=now.done, total=now.total, left=left + failed)
+
+        yield show
+
+
+def duration(seconds: float) -> str:
+    """A time for people."""
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5940 else f"{seconds / 3600:.1f} h"
+
+
+def export(rows: Sequence[dict[str, Any]], csv: Path | None, parquet: Path | None) -> None:
+    """Write the rows where the user asked for them."""
+    from colift.campaign.store import write_csv, write_parquet
+
+    if csv is not None:
+        write_csv(list(rows), csv)
+    if parquet is not None:
+        write_parquet(list(rows), parquet)
+
+
+def command_line() -> str:
+    """The command as it was given."""
+    return shlex.join(["colift", *sys.argv[1:]])
+
+
+def show_end(outcome: Outcome, files: dict[str, Path]) -> None:
+    """Say what was flown now, what failed and where everything is."""
+    there = len({row["key"] for row in outcome.rows}) - outcome.flown
+    known = f"; {there} were there already" if there else ""
+    if outcome.flown:
+        out.print(
+            f"{outcome.flown} flights in {duration(outcome.wall_time)} on {outcome.workers} "
+            f"worker{'s' * (outcome.workers != 1)}{known}."
+        )
+    else:
+        out.print(f"All {there} flights were there already.")
+    failed = [row for row in outcome.rows if row["status"] == "failed"]
+    for row in failed[:5]:
+        out.print(f"[red]failed[/red]: {escape(row['error'])}", highlight=False, soft_wrap=True)
+    if len(failed) > 5:
+        out.print(f"... and {len(failed) - 5} more; --retry-failed flies them again.")
+    for name, path in files.items():
+        out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)

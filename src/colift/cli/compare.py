@@ -1,0 +1,151 @@
+"""`colift compare`: allocators side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from colift.cli.base import (
+    EXIT_ERROR,
+    Json,
+    Sets,
+    With,
+    app,
+    emit,
+    loading,
+    new_folder,
+    out,
+    save_json,
+    show_tables,
+)
+from colift.cli.campaign import (
+    FILE,
+    Csv,
+    KeepRecordings,
+    Parquet,
+    RetryFailed,
+    Scheduler,
+    Seeds,
+    Workers,
+    command_line,
+    export,
+    flights,
+    show_end,
+)
+
+
+@app.command()
+def compare(
+    allocators: Annotated[
+        str | None,
+        typer.Option(metavar="A,B,...", help="Who takes part.", show_default="all installed"),
+    ] = None,
+    missions: Annotated[
+        str | None,
+        typer.Option(metavar="M,N,...", help="Missions.", show_default="five of the shipped"),
+    ] = None,
+    seeds: Seeds = 3,
+    quick: Annotated[
+        bool, typer.Option(help="Two missions of 4 s, one seed; a first look.")
+    ] = False,
+    spread: Annotated[
+        bool, typer.Option(help="Sweep what each allocator spends on separation as well.")
+    ] = True,
+    sets: Sets = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/compare-DATE-TIME"),
+    ] = None,
+    extra: With = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry_failed: RetryFailed = False,
+    recordings: KeepRecordings = False,
+    csv: Csv = None,
+    parquet: Parquet = None,
+    as_json: Json = False,
+) -> None:
+    """Fly every allocator on the same missions; say who is best at what, and what separation costs.
+
+    With --out DIR of an earlier, perhaps interrupted comparison, only what is missing is flown.
+
+    [bold]Examples[/bold]
+
+      colift compare
+      colift compare --allocators sqp,safe --missions hover,my-mission.toml --seeds 10
+      colift compare --with examples/my_allocator.py --quick
+    """
+    from colift.mission.load import parse_override
+
+    with loading():
+        from colift.campaign import compare as study
+        from colift.campaign import engine, judge
+        from colift.campaign.plan import Source, plan
+
+        sources = [Source.read(path) for path in extra or []]
+        own = study.own_allocators(sources)
+        able, missing = study.contestants(allocators and allocators.split(","), own)
+        changes = dict(parse_override(text) for text in sets or [])
+        if quick:
+            seeds, changes = 1, {"timing.duration": 4.0, **changes}
+        chosen = (
+            missions.split(",") if missions else study.QUICK_MISSIONS if quick else study.MISSIONS
+        )
+        planned = plan(study.cases(able, chosen, seeds, changes, spread=spread), sources)
+    target = folder or new_folder("compare")
+    with flights("Comparing") as advance:
+        outcome = engine.run(
+            planned,
+            engine.Options(
+                file=target / FILE, workers=workers, scheduler=scheduler,
+                retry_failed=retry_failed, progress=advance,
+                recordings=target / "recordings" if recordings else None,
+            ),
+        )  # fmt: skip
+    from colift.report.campaign import contest_table, write_contest
+
+    contest = [row for row in outcome.rows if row["study"] == study.CONTEST]
+    field = judge.contestants(contest)
+    said = judge.words(field, judge.criteria_of(contest))
+    files = {
+        "report": write_contest(
+            outcome.rows, target, said, command=command_line(), notes=study.protocol(seeds, changes)
+        ),
+        "results": target / FILE,
+    }
+    result = {
+        "allocators": {
+            c.name: {"flights": c.flights, "held": c.held, "lost": c.lost, "failed": c.failed}
+            | {"values": dict(c.values)}
+            for c in field
+        },
+        "missions": list(chosen),
+        "seeds": seeds,
+        "period_s": changes.get("timing.allocation", study.PERIOD),
+        "words": said,
+        "not_installed": missing,
+        "flown": outcome.flown,
+        "wall_time_s": outcome.wall_time,
+        "workers": outcome.workers,
+        "files": {name: str(path) for name, path in files.items()},
+    }
+    save_json(target / "compare.json", result)
+    export(outcome.rows, csv, parquet)
+    if as_json:
+        emit(result)
+    else:
+        criteria = judge.criteria_of(contest)
+        show_tables(
+            (title, *contest_table(contest, [c for c in criteria if c.group == title]))
+            for title in judge.GROUPS
+        )
+        for sentence in said:
+            out.print(f"- {escape(sentence)}", highlight=False)
+        for sentence in missing:
+            out.print(f"Not compared: {escape(sentence)}", highlight=False)
+        show_end(outcome, files)
+    if any(row["status"] == "failed" for row in outcome.rows):
+        raise typer.Exit(EXIT_ERROR)

@@ -1,0 +1,87 @@
+"""`colift import`: logs of a real flight become a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from colift.cli.base import Json, app, emit, out
+
+
+@app.command(name="import")
+def import_(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="One log of all drones, or one log of each drone."),
+    ],
+    target: Annotated[
+        Path | None,
+        typer.Option("--out", help="Recording to write.", show_default="FILE.h5, in this folder"),
+    ] = None,
+    load_mass: Annotated[float, typer.Option(help="Mass of the load, kg.")] = 0.01,
+    drone_mass: Annotated[float, typer.Option(help="Mass of a drone, kg.")] = 0.034,
+    cable_length: Annotated[
+        float | None,
+        typer.Option(help="Length of a cable, m.", show_default="median distance to the load"),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the flight.", show_default="name of the first file")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Turn the logs of a real flight into a recording, for `report` and `judge`.
+
+    Reads CSV (see docs/real-flights.md) and the Crazyflie's micro-SD logs, one a drone, whose clocks are
+    aligned by the motion of the load. What was not logged stays unknown.
+
+    [bold]Examples[/bold]
+
+      colift import flight.csv --out flight.h5
+      colift import cf2_01 cf7_01 --load-mass 0.0098 --out window.h5
+    """
+    from pydantic import ValidationError
+
+    from colift import metrics
+    from colift.importing import Assumed, import_flight
+
+    try:
+        assumed = Assumed(load_mass=load_mass, drone_mass=drone_mass, cable_length=cable_length)
+    except ValidationError as error:
+        first = error.errors()[0]
+        option = f"--{first['loc'][0]}".replace("_", "-")
+        raise typer.BadParameter(f"{option}: {first['msg']}; found {first['input']}") from None
+    recording = import_flight(files, assumed, name=name)
+    path = recording.save(target or Path(f"{files[0].stem}.h5"))
+    numbers = {k: v for k, v in metrics.compute(recording).items() if v == v}
+    if as_json:
+        emit(
+            {
+                "flight": recording.mission.name,
+                "drones": recording.n,
+                "duration_s": float(recording.time[-1]),
+                "rows": len(recording.time),
+                "cable_lengths_m": recording.mission.team.cable_lengths.tolist(),
+                "metrics": numbers,
+                "provenance": recording.provenance,
+                "file": str(path),
+            }
+        )
+        return
+    lengths = ", ".join(f"{length:.3f}" for length in recording.mission.team.cable_lengths)
+    out.print(
+        f"{escape(recording.mission.name)}: {recording.n} drones, {recording.time[-1]:.2f} s in "
+        f"{len(recording.time)} rows; cables {lengths} m",
+        highlight=False,
+    )
+    for file in recording.provenance["files"][1:]:
+        out.print(
+            f"{escape(file['name'])}: clock shifted by {file['clock_offset_s']:+.4f} s; its load lies "
+            f"{1e3 * file['load_mismatch_rms_m']:.1f} mm RMS from the first log's",
+            highlight=False,
+        )
+    for key, value in numbers.items():
+        out.print(f"{key:>24}  {value:.4g}", highlight=False)
+    out.print(f"{'recording':>24}  {escape(str(path))}", highlight=False, soft_wrap=True)

@@ -1,0 +1,36 @@
+"""`colift report`: the report of any recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from colift.cli.base import Json, app, emit, out
+
+
+@app.command()
+def report(
+    recording: Annotated[Path, typer.Argument(help="A recording, simulated or imported.")],
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="the recording's name"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write the HTML report and the figures of a recording, of a simulation or of a real flight."""
+    from colift import metrics
+    from colift.recording import Recording
+    from colift.report.html import write_report
+
+    flight = Recording.load(recording)
+    numbers = metrics.compute(flight)
+    page = write_report(flight, folder or recording.with_suffix(""), metrics=numbers)
+    sentence = metrics.verdict(flight, numbers)[1]
+    if as_json:
+        emit({"summary": sentence, "metrics": numbers, "report": str(page)})
+    else:
+        out.print(f"{escape(flight.mission.name)}: {escape(sentence)}", highlight=False)
+        out.print(escape(str(page)), highlight=False, soft_wrap=True)

@@ -1,0 +1,132 @@
+"""`colift sweep`: one mission over many values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from colift.cli.base import (
+    EXIT_ERROR,
+    Json,
+    Sets,
+    With,
+    app,
+    emit,
+    loading,
+    new_folder,
+    show_tables,
+)
+from colift.cli.campaign import (
+    FILE,
+    Csv,
+    KeepRecordings,
+    Parquet,
+    RetryFailed,
+    Scheduler,
+    Seeds,
+    Workers,
+    command_line,
+    export,
+    flights,
+    show_end,
+)
+
+
+@app.command()
+def sweep(
+    mission: Annotated[
+        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
+    ],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            "--over",
+            metavar="KEY=LOW:HIGH:COUNT[:log]",
+            help="Field to sweep, or KEY=VALUE,VALUE,...; several of them make a grid.",
+        ),
+    ],
+    seeds: Seeds = 1,
+    sets: Sets = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/sweep-DATE-TIME"),
+    ] = None,
+    extra: With = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry_failed: RetryFailed = False,
+    recordings: KeepRecordings = False,
+    csv: Csv = None,
+    parquet: Parquet = None,
+    as_json: Json = False,
+) -> None:
+    """Fly one mission over values of any of its fields, and over seeds; table, plots and all numbers.
+
+    With --out DIR of an earlier, perhaps interrupted sweep, only what is missing is flown.
+
+    [bold]Examples[/bold]
+
+      colift sweep paper-spiral --over allocation.mu=0.05:2:40 --seeds 20
+      colift sweep hover --over load.mass=0.1:2:20:log --over allocation.kind=sqp,safe
+    """  # fmt: skip
+    from colift.mission.load import parse_override
+
+    with loading():
+        from colift.campaign import engine
+        from colift.campaign import sweep as study
+        from colift.campaign.plan import Source, plan
+
+        sources = [Source.read(path) for path in extra or []]
+        overs = [study.parse_over(text) for text in over]
+        changes = dict(parse_override(text) for text in sets or [])
+        planned = plan(study.cases(mission, overs, seeds, changes), sources)
+    target = folder or new_folder("sweep")
+    with flights(f"Sweeping {mission}") as advance:
+        outcome = engine.run(
+            planned,
+            engine.Options(
+                file=target / FILE, workers=workers, scheduler=scheduler,
+                retry_failed=retry_failed, progress=advance,
+                recordings=target / "recordings" if recordings else None,
+            ),
+        )  # fmt: skip
+    from colift.report.campaign import sweep_tables, write_sweep
+    from colift.report.campaign_figures import Swept
+
+    swept = Swept(outcome.rows, overs)
+    title = f"{mission} over {', '.join(o.path for o in overs)}"
+    files = {
+        "report": write_sweep(title, swept, target, command=command_line()),
+        "results": target / FILE,
+    }
+    export(outcome.rows, csv, parquet)
+    if as_json:
+        emit(
+            {
+                "mission": mission,
+                "over": {o.path: list(o.values) for o in overs},
+                "seeds": seeds,
+                "points": [
+                    {
+                        "values": dict(zip((o.path for o in overs), point.values, strict=True)),
+                        "flights": point.flights,
+                        "completed": point.completed,
+                        "metrics": {
+                            name: dict(zip(("mean", "min", "max"), numbers, strict=True))
+                            for name, numbers in point.spread.items()
+                        },
+                    }
+                    for point in swept.points
+                ],
+                "flown": outcome.flown,
+                "wall_time_s": outcome.wall_time,
+                "files": {name: str(path) for name, path in files.items()},
+            }
+        )
+    else:
+        show_tables(sweep_tables(swept))
+        show_end(outcome, files)
+    if any(row["status"] == "failed" for row in outcome.rows):
+        raise typer.Exit(EXIT_ERROR)

@@ -1,0 +1,134 @@
+"""Who wins at what, from rows that are made up."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from colift.campaign import judge
+
+
+def row(allocator: str, **values: Any) -> dict[str, Any]:
+    return {"allocator": allocator, "tracking_max_m": 0.01, **values}
+
+
+def said(rows: list[dict[str, Any]]) -> list[str]:
+    return judge.words(judge.contestants(rows), judge.criteria_of(rows))
+
+
+def about(rows: list[dict[str, Any]], title: str) -> str:
+    (sentence,) = (text for text in said(rows) if text.startswith(title))
+    return sentence
+
+
+def test_the_best_is_named_with_the_second_and_the_last() -> None:
+    rows = [
+        row("a", min_angle_deg=30.0),
+        row("b", min_angle_deg=45.0),
+        row("c", min_angle_deg=20.0),
+    ]
+    expected = "Actual angle (worst): b leads with 45 deg before a (30 deg); last c, 20 deg."
+    assert about(rows, "Actual angle") == expected
+
+
+def test_the_worst_flight_counts_for_angles_and_the_mean_for_effort() -> None:
+    rows = [
+        row("a", min_angle_deg=50.0, tension_integral_Ns=10.0),
+        row("a", min_angle_deg=10.0, tension_integral_Ns=20.0),
+        row("b", min_angle_deg=30.0, tension_integral_Ns=14.0),
+    ]
+    a, _ = judge.contestants(rows)
+    assert (a.values["min_angle_deg"], a.values["tension_integral_Ns"]) == (10.0, 15.0)
+    assert about(rows, "Actual angle").startswith("Actual angle (worst): b leads")
+    assert about(rows, "Tension integral").startswith("Tension integral (mean): b leads")
+
+
+def test_less_than_the_resolution_is_a_tie() -> None:
+    rows = [
+        row("a", min_angle_deg=44.2),
+        row("b", min_angle_deg=45.0),
+        row("c", min_angle_deg=20.0),
+    ]
+    assert "b and a are level at 45 deg; last c" in about(rows, "Actual angle")
+    level = [row("a", slack_time_s=0.0), row("b", slack_time_s=0.0)]
+    assert about(level, "Slack") == "Slack (total): no difference worth the name (0 s)."
+
+
+def test_who_drops_the_load_is_named_and_not_ranked() -> None:
+    rows = [
+        row("light", tension_integral_Ns=1.0, outcome="diverged before t = 3 s"),
+        row("far", tension_integral_Ns=2.0) | {"tracking_max_m": judge.LOST + 0.01},
+        row("broken", status="failed", error="ValueError: no"),
+        row("a", tension_integral_Ns=20.0),
+        row("b", tension_integral_Ns=10.0),
+    ]
+    text = said(rows)
+    assert text[0].startswith("2 of 5 flights were held to the end, in 2 the load was lost")
+    assert text[0].endswith("1 ended in an error.")
+    assert "light is not ranked: lost the load in 1 of 1 flights." in text
+    assert "far is not ranked: lost the load in 1 of 1 flights." in text
+    assert "broken is not ranked: ended in an error in 1 of 1 flights." in text
+    assert about(rows, "Tension integral").startswith(
+        "Tension integral (mean): b leads with 10 N s"
+    )
+    assert math.isnan(judge.contestants(rows)[0].values["tension_integral_Ns"])
+
+
+def test_one_flight_lost_of_many_is_enough_not_to_be_ranked() -> None:
+    rows = [row("a"), row("a", outcome="diverged before t = 1 s"), row("b"), row("c")]
+    a, *_ = judge.contestants(rows)
+    assert (a.flights, a.held, a.lost, a.failed, a.ranked) == (2, 1, 1, 0, False)
+
+
+def test_nobody_left_is_said() -> None:
+    lost = row("a", outcome="diverged before t = 1 s", min_angle_deg=3.0)
+    assert said([lost, row("b", min_angle_deg=40.0)])[-1] == "Fewer than two are left to rank."
+
+
+def test_nan_is_no_value_and_wins_nothing() -> None:
+    rows = [
+        row(name, min_angle_deg=angle) for name, angle in (("a", math.nan), ("b", 9.0), ("c", 5.0))
+    ]
+    assert "b leads" in about(rows, "Actual angle")
+    assert "a" not in about(rows, "Actual angle").split(": ", 1)[1].replace(" and ", " ").split()
+
+
+@pytest.mark.parametrize(
+    ("pairs", "free"),
+    [
+        ({"a": (40.0, 10.0), "b": (30.0, 12.0)}, ["a"]),
+        ({"a": (40.0, 12.0), "b": (30.0, 10.0)}, ["a", "b"]),
+        ({"a": (40.0, 10.0), "b": (40.0, 10.0)}, ["a", "b"]),
+        ({"a": (40.0, 10.0), "b": (40.0, 11.0), "c": (50.0, 20.0)}, ["a", "c"]),
+        ({"a": (40.0, 10.0), "b": (39.5, 10.05)}, ["a", "b"]),  # level in both
+        ({"a": (40.0, 10.0), "b": (40.5, 12.0)}, ["a"]),  # half a degree is no reason
+    ],
+)
+def test_undominated_are_those_nobody_beats_at_both(
+    pairs: dict[str, tuple[float, float]], free: list[str]
+) -> None:
+    rows = [
+        row(name, min_angle_deg=angle, tension_integral_Ns=effort)
+        for name, (angle, effort) in pairs.items()
+    ]
+    assert judge.undominated(judge.contestants(rows)) == free
+
+
+def test_the_tally_counts_only_criteria_on_which_they_differ() -> None:
+    rows = [
+        row("a", min_angle_deg=40.0, peak_tension_N=1.0, slack_time_s=0.0),
+        row("b", min_angle_deg=20.0, peak_tension_N=2.0, slack_time_s=0.0),
+    ]
+    assert "of the 2 criteria on which they differ: a 2, b 0." in said(rows)[-1]
+
+
+def test_rows_of_anything_else_need_only_an_allocator_and_numbers() -> None:
+    rows = [
+        {"allocator": "a", "mission": "a real flight", "min_angle_deg": 30.0},
+        {"allocator": "b", "mission": "a real flight", "min_angle_deg": 50.0},
+        {"allocator": "b", "mission": "not flown yet", "status": "missing"},
+    ]
+    assert [c.metric for c in judge.criteria_of(rows)] == ["min_angle_deg"]
+    assert said(rows)[0] == "All 2 allocators held the load in all of their flights (2 in total)."

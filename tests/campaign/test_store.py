@@ -1,0 +1,115 @@
+"""The file of results: what it refuses, and what leaves it."""
+
+from __future__ import annotations
+
+import csv
+import sqlite3
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from campaign_helpers import hover
+
+from colift.campaign.plan import Job, plan
+from colift.campaign.store import Store, write_csv, write_parquet
+from colift.campaign.workers import Result
+from colift.errors import ColiftError, MissingExtraError
+
+
+def filled(path: Path) -> list[Job]:
+    """A file with a flown run, a failed one and a case that is still to be flown."""
+    planned = plan([hover("sqp"), hover("ring"), hover("safe")])
+    with Store(path, create=True) as store, store.writing():
+        store.ask(planned)
+        store.ask(planned)  # asking twice changes nothing
+        jobs = [job for _, job in planned]
+        numbers = {"tracking_rms_m": 0.25, "tension_integral_10s_Ns": float("nan")}
+        flown = Result(
+            jobs[0].key, outcome="completed", metrics=numbers, wall_time=1.5, worker="w:1"
+        )
+        store.add(jobs[0], flown, None)
+        store.add(jobs[1], Result(jobs[1].key, error="no, it is\n broken"), None)
+    return jobs
+
+
+def test_rows_say_what_was_flown_what_failed_and_what_is_missing(tmp_path: Path) -> None:
+    jobs = filled(tmp_path / "c.sqlite")
+    with Store(tmp_path / "c.sqlite") as store:
+        rows = store.rows()
+        assert [row["status"] for row in rows] == ["flown", "failed", "missing"]
+        assert [row["key"] for row in rows] == [job.key for job in jobs]
+        assert rows[0]["tracking_rms_m"] == 0.25
+        assert rows[0]["tension_integral_10s_Ns"] != rows[0]["tension_integral_10s_Ns"]  # NaN
+        assert store.wall_times() == [("sqp", 0.2, 1.5)]
+        assert [row["key"] for row in store.rows([jobs[1].key])] == [jobs[1].key]
+
+
+def test_a_run_cannot_be_counted_twice(tmp_path: Path) -> None:
+    job, *_ = filled(tmp_path / "c.sqlite")
+    with Store(tmp_path / "c.sqlite") as store:
+        before = store.rows()
+        again = Result(job.key, outcome="completed", metrics={"tracking_rms_m": 9.0})
+        with pytest.raises(sqlite3.IntegrityError):
+            store.add(job, again, None)
+        assert repr(store.rows()) == repr(before)
+
+
+def test_a_run_whose_numbers_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
+    _, _, job = filled(tmp_path / "c.sqlite")
+    bad: Any = {"tracking_rms_m": 1.0, "worse": object()}
+    with Store(tmp_path / "c.sqlite") as store:
+        with pytest.raises(sqlite3.Error):
+            store.add(job, Result(job.key, outcome="completed", metrics=bad), None)
+        assert store.rows()[2]["status"] == "missing"
+        assert "tracking_rms_m" not in store.rows()[2]
+
+
+def test_csv_and_parquet_hold_every_row(tmp_path: Path) -> None:
+    filled(tmp_path / "c.sqlite")
+    with Store(tmp_path / "c.sqlite") as store:
+        rows = store.rows()
+    write_csv(rows, tmp_path / "c.csv")
+    with (tmp_path / "c.csv").open(newline="") as file:
+        read = list(csv.DictReader(file))
+    assert [row["allocator"] for row in read] == ["sqp", "ring", "safe"]
+    assert (read[0]["tracking_rms_m"], read[0]["tension_integral_10s_Ns"]) == ("0.25", "")
+    assert read[1]["error"] == "no, it is\n broken"
+
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    write_parquet(rows, tmp_path / "c.parquet")
+    table = parquet.read_table(tmp_path / "c.parquet").to_pydict()
+    assert table["status"] == ["flown", "failed", "missing"]
+    assert table["tracking_rms_m"] == [0.25, None, None]
+
+
+def test_labels_of_several_types_share_a_column_as_text(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    rows = [{"x": 1, "y": 1}, {"x": 0.5, "y": "safe"}, {"x": None}]
+    write_parquet(rows, tmp_path / "c.parquet")
+    table = parquet.read_table(tmp_path / "c.parquet").to_pydict()
+    assert table == {"x": [1.0, 0.5, None], "y": ["1", "safe", None]}
+
+
+def test_without_pyarrow_the_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'colift\[parquet\]'"):
+        write_parquet([{"x": 1}], tmp_path / "c.parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_files_are_refused_and_left_alone(tmp_path: Path) -> None:
+    text, other = tmp_path / "notes.txt", tmp_path / "other.sqlite"
+    text.write_text("not a database, and long enough to be read as one" * 100)
+    with sqlite3.connect(other) as database:
+        database.execute("CREATE TABLE mine (x)")
+    before = text.read_bytes(), other.read_bytes()
+    for path in (text, other):
+        for create in (False, True):
+            with pytest.raises(ColiftError, match="not a file of campaign results"):
+                Store(path, create=create)
+    assert (text.read_bytes(), other.read_bytes()) == before
+    with pytest.raises(ColiftError, match="no such file"):
+        Store(tmp_path / "nowhere.sqlite")

@@ -1,0 +1,184 @@
+"""What goes into a page: the recording's own numbers, thinned, and its moments."""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from flown import fly, payload_of
+
+from colift import metrics
+from colift.recording import Recording
+from colift.viewer.data import BUDGET, RATE, payload
+from colift.viewer.events import find_events
+from colift.viewer.page import live_page, replay_page
+
+
+def unpack(packed: dict[str, Any], kind: str = "<f4") -> np.ndarray[Any, Any]:
+    return np.frombuffer(base64.b64decode(packed["data"]), kind).reshape(packed["shape"])
+
+
+def change(recording: Recording, **signals: Any) -> Recording:
+    """The recording with some signals replaced: by functions of their values."""
+    arrays = dict(recording.arrays)
+    for name, function in signals.items():
+        arrays[name] = function(arrays[name].copy())
+    return replace(recording, arrays=arrays)
+
+
+def test_rows_are_rows_of_the_recording(spiral: Recording) -> None:
+    flight = payload_of(spiral)["flights"][0]
+    time = unpack(flight["time"], "<f8")
+    rows = np.searchsorted(spiral.time, time)
+    assert np.array_equal(spiral.time[rows], time)
+    assert (time[0], time[-1]) == (spiral.time[0], spiral.time[-1])
+    for name, wanted in {
+        "tensions": spiral["tensions"],
+        "attitudes": spiral["attitudes"],
+        "load": spiral["load"][:, 0],
+        "external": spiral["external_forces"][:, -1],
+    }.items():
+        assert np.array_equal(unpack(flight["signals"][name]), wanted[rows].astype("<f4")), name
+
+
+def test_rows_are_at_most_the_rate_and_keep_the_extremes(spiral: Recording) -> None:
+    def spike(tensions: Any) -> Any:
+        tensions[101, 2] = 50.0
+        return tensions
+
+    flight = payload_of(change(spiral, tensions=spike))["flights"][0]
+    tensions = unpack(flight["signals"]["tensions"])
+    assert len(tensions) <= RATE * spiral.time[-1] + 12
+    assert tensions.max() == 50.0
+
+
+def test_twenty_seconds_of_four_drones_stay_below_two_megabytes() -> None:
+    flight = fly(**{"timing.duration": 20.0})
+    assert len(replay_page(payload_of(flight))) < 1_300_000
+    assert len(replay_page(payload_of(flight, flight, flight))) < 2_000_000
+
+
+def test_many_drones_are_thinned_to_the_budget() -> None:
+    flight = payload_of(fly(**{"drones.count": 24, "timing.duration": 15.0}))["flights"][0]
+    rows, size = flight["time"]["shape"][0], len(json.dumps(flight["signals"]))
+    assert 10.0 * 15.0 < rows < RATE * 15.0
+    assert size < 1.15 * BUDGET
+
+
+def test_solve_time_is_the_longest_and_status_the_worst_since_the_row_before(
+    spiral: Recording,
+) -> None:
+    def once(values: Any) -> Any:
+        values[777] = 5.0
+        return values
+
+    flight = payload_of(change(spiral, allocator_time=once, allocator_status=once))["flights"][0]
+    time = unpack(flight["time"], "<f8")
+    row = np.searchsorted(time, spiral.cycle_time[777])
+    for name in ("solve_time", "status"):
+        values = unpack(flight["signals"][name])
+        assert values[row] == 5.0, name
+        assert np.count_nonzero(values == 5.0) == 1, name
+
+
+def test_uneven_times_and_unknown_signals_pass(spiral: Recording) -> None:
+    rng = np.random.default_rng(3)
+    rows = np.sort(rng.choice(len(spiral.time), 150, replace=False))
+    known = {
+        name: values[rows] for name, values in spiral.arrays.items() if "allocator" not in name
+    }
+    unknown = ("tensions", "attitudes", "thrusts", "slack_times", "desired_tensions")
+    arrays = {
+        **spiral.arrays,
+        **known,
+        **{name: np.full_like(known[name], np.nan) for name in unknown},
+    }
+    real = replace(
+        spiral, time=spiral.time[rows], cycle_time=np.empty(0),
+        arrays={k: v[:0] if "allocator" in k else v for k, v in arrays.items()},
+    )  # fmt: skip
+    data = payload([real], [{}], ["real"])
+    json.dumps(data, allow_nan=False)
+    signals = data["flights"][0]["signals"]
+    assert np.isnan(unpack(signals["tensions"])).all()
+    assert np.isnan(unpack(signals["solve_time"])).all()
+    assert np.isfinite(unpack(signals["load"])).all()
+
+
+def test_a_flight_of_one_row_passes(spiral: Recording) -> None:
+    arrays = {k: v[:1] for k, v in spiral.arrays.items()}
+    short = replace(spiral, time=spiral.time[:1], cycle_time=spiral.cycle_time[:1], arrays=arrays)
+    assert payload([short], [{}], ["short"])["flights"][0]["time"]["shape"] == [1]
+
+
+def test_events_are_found_with_their_numbers(spiral: Recording) -> None:
+    def slack(times: Any) -> Any:
+        times[:, 1] += np.clip(spiral.time - 0.5, 0.0, 0.2)
+        return times
+
+    def narrow(directions: Any) -> Any:
+        directions[300:320, 1] = directions[300:320, 0]
+        return directions
+
+    def failing(status: Any) -> Any:
+        status[1200:1203] = 4
+        return status
+
+    events = find_events(
+        change(spiral, slack_times=slack, directions=narrow, allocator_status=failing)
+    )
+    found = [(event["kind"], round(event["time"], 3), event["drone"]) for event in events]
+    assert found == [("slack", 0.505, 1), ("fallback", 1.2, None), ("angle", 1.5, None)]
+    assert events[0]["text"] == "Cable 2 slack for 0.2 s"
+    assert events[1]["text"] == "Allocator: numerical failure, 3 cycles"
+    assert "Cables 1 and 2 down to 0.0 deg" in events[2]["text"]
+
+
+@pytest.mark.parametrize(
+    ("mission", "kind", "text"),
+    [
+        ("four-to-three", "fault", "Cable of drone 1 cut"),
+        ("three-to-four", "command", "Drone 4 joins"),
+        ("payload-step", "command", "load.mass = "),
+    ],
+)
+def test_what_the_mission_asks_for_is_an_event(mission: str, kind: str, text: str) -> None:
+    events = [event for event in find_events(fly(mission)) if event["kind"] == kind]
+    assert any(event["text"].startswith(text) and event["time"] == 1.0 for event in events), events
+
+
+def test_a_diverged_flight_ends_in_a_fault(spiral: Recording) -> None:
+    last = find_events(replace(spiral, outcome="diverged before t = 2 s"))[-1]
+    assert (last["kind"], last["text"]) == ("fault", "Diverged before t = 2 s")
+
+
+def test_the_page_allows_its_own_script_and_nothing_else(spiral: Recording) -> None:
+    page = replay_page(payload_of(spiral))
+    policy = page.split('http-equiv="Content-Security-Policy" content="')[1].split('"')[0]
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules["default-src"] == rules["connect-src"] == "'none'"
+    assert rules["script-src"].startswith("'sha256-")
+    assert "unsafe" not in policy
+    assert page.count("</script>") == 2
+    assert page.count("</style>") == 1
+
+
+def test_the_live_page_has_no_inline_script_or_style() -> None:
+    page = live_page()
+    assert '<script src="/assets/viewer.js" defer></script>' in page
+    assert "<style" not in page
+    assert page.count("<script") == 1
+
+
+def test_equal_recordings_give_equal_pages(spiral: Recording) -> None:
+    assert replay_page(payload_of(spiral)) == replay_page(payload_of(spiral))
+
+
+def test_numbers_of_the_page_are_the_metrics(spiral: Recording) -> None:
+    shown = {m["name"]: m["value"] for m in payload_of(spiral)["flights"][0]["metrics"]}
+    wanted = metrics.compute(spiral)
+    assert shown == {k: v if np.isfinite(v) else None for k, v in wanted.items()}

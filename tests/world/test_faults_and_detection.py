@@ -1,0 +1,259 @@
+"""What breaks, who notices, and how the flight goes on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import colift
+from colift.detection.residuals import Residuals
+from colift.fault.base import LOAD
+from colift.fault.battery_low import BatteryLow
+from colift.fault.motor_degraded import MotorDegraded
+from colift.metrics import compute
+from colift.mission import load_mission
+from colift.reference.descent import Descent
+from colift.simulation.flight import Flight
+
+AT = 3.0
+REAL = ["ideal", "real"]
+
+
+def mission(world, fault=None, n=4, seed=0, duration=5.0, **overrides):
+    """The spiral with n drones; ``real`` has noise, delay, loss, motors, wind and turbulence."""
+    table = load_mission("cut-in-flight").resolved()
+    table["fault"] = [] if fault is None else [{"at": AT, "drone": 1, **fault}]
+    table["drones"]["count"], table["seed"], table["timing"]["duration"] = n, seed, duration
+    if world == "ideal":
+        table["disturbance"] = []
+        table["detection"]["frozen"] = 0.0
+        for layer in ("sensing", "link", "actuation"):
+            table[layer] = {"kind": "ideal"}
+    return load_mission(table, {path.replace("__", "."): v for path, v in overrides.items()})
+
+
+def fly(world, fault=None, **settings):
+    flight = Flight(mission(world, fault, **settings))
+    return flight, flight.run()
+
+
+def error(recording):
+    return np.linalg.norm(recording["load"][:, 0] - recording["reference"][:, 0], axis=1)
+
+
+# ---------------------------------------------------------------- faults
+
+
+def test_a_dead_drone_hangs_from_the_load_or_falls():
+    for with_cable in (True, False):
+        fault = {"kind": "drone-lost", "with_cable": with_cable}
+        _, r = fly("ideal", fault, duration=AT + 0.4, detection__kind="none")
+        assert r.outcome == "completed"
+        assert r["attached"][-1, 1] == float(with_cable)
+        assert (r["motor_health"][-1, 1] == 0.0).all()
+        assert (r["applied_thrusts"][r.time >= AT, 1] == 0.0).all()
+        after = r["velocities"][-1, 1, 2] - r["velocities"][r.time >= AT][0, 1, 2]
+        fallen = 9.81 * (r.time[-1] - AT)
+        if with_cable:
+            assert after > -0.95 * fallen
+        else:
+            assert after == pytest.approx(-fallen, rel=0.01)
+
+
+def test_battery_falls_in_equal_steps():
+    changes = list(BatteryLow(health=0.6, duration=2.0, steps=5).changes(2, 1.0))
+    assert [c.at for c in changes] == [1.0, 1.5, 2.0, 2.5, 3.0]
+    np.testing.assert_allclose([c.value for c in changes], [0.92, 0.84, 0.76, 0.68, 0.6])
+    assert {(c.signal, c.drone) for c in changes} == {("motor_health", 2)}
+
+
+def test_two_weak_motors_of_one_drone_keep_both_faults():
+    table = mission("ideal").resolved()
+    table["fault"] = [
+        {"kind": "motor-degraded", "at": 0.1, "drone": 1, "motor": 0, "health": 0.9},
+        {"kind": "motor-degraded", "at": 0.2, "drone": 1, "motor": 2, "health": 0.8},
+    ]
+    flight = Flight(load_mission(table))
+    flight.advance(0.3)
+    np.testing.assert_array_equal(flight.bus.motor_health[1], [0.9, 1.0, 0.8, 1.0])
+    np.testing.assert_array_equal(flight.bus.motor_health[[0, 2, 3]], 1.0)
+    assert next(iter(MotorDegraded(motor=3).changes(0, 1.0))).value == (None, None, None, 0.5)
+
+
+def test_stuck_sensors_of_load_and_drone_come_back():
+    for body, signal, row in (("drone", "measured_positions", 1), ("load", "measured_load", 0)):
+        fault = {"kind": "sensor-stuck", "body": body, "duration": 0.2}
+        _, r = fly("ideal", fault, duration=AT + 0.5, detection__kind="none")
+        during = (r.time > AT) & (r.time < AT + 0.2)
+        assert np.ptp(r[signal][during, row], axis=0).max() == 0.0
+        truth = r["positions"][:, 1] if body == "drone" else r["load"][:, 0]
+        assert np.ptp(truth[during], axis=0).max() > 0.02
+        np.testing.assert_array_equal(r[signal][-1, row], truth[-1])
+        stuck = r["stuck"][r.time > AT][0]
+        assert stuck.sum() == 1.0
+        assert stuck[LOAD if body == "load" else 1] == 1.0
+
+
+def test_a_silent_allocator_leaves_the_drones_with_what_they_have():
+    _, r = fly("ideal", {"kind": "allocator-silent", "duration": 0.3}, duration=AT + 1.0)
+    during = (r.time > AT) & (r.time < AT + 0.3)
+    assert np.ptp(r["received_directions"][during], axis=0).max() == 0.0
+    assert (r["allocator_status"][(r.cycle_time > AT) & (r.cycle_time < AT + 0.29)] == 9).all()
+    assert r["allocator_status"][-1] == 0
+    assert error(r).max() < 0.05
+
+
+def test_a_released_load_falls_freely_and_nobody_is_blamed():
+    flight, r = fly("ideal", {"kind": "load-released"}, duration=AT + 0.5)
+    assert flight.found == []
+    fall = r["load"][-1, 1, 2] - r["load"][r.time >= AT][0, 1, 2]
+    assert fall == pytest.approx(-9.81 * 0.5, rel=0.01)
+
+
+# ---------------------------------------------------------------- detection
+
+
+@pytest.mark.parametrize("world", REAL)
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "cable-cut"},
+        {"kind": "drone-lost"},
+        {"kind": "drone-lost", "with_cable": False},
+    ],
+    ids=["cable", "drone", "both"],
+)
+def test_lost_drones_are_found_and_the_others_carry_on(world, fault):
+    for seed in range(3):
+        flight, r = fly(world, fault, seed=seed, duration=AT + 2.5)
+        assert r.outcome == "completed"
+        assert [drone for _, drone in flight.found] == [1]
+        assert 0.0 < flight.found[0][0] - AT <= 0.16
+        assert flight.drones == [0, 2, 3]
+        assert error(r).max() < 0.15
+        metrics = compute(r)
+        assert metrics["lost_drones"] == 1.0
+        assert metrics["detection_delay_s"] == pytest.approx(flight.found[0][0] - AT, abs=0.006)
+        assert metrics["min_angle_deg"] > 20.0
+
+
+def test_no_false_alarm_without_a_fault():
+    """Twelve seeds of noise, delay, loss, motors, wind of 10 m/s and its turbulence."""
+    worst = 0.0
+    for seed in range(12):
+        wind = {"disturbance.0.speed": 10.0, "disturbance.1.speed": 10.0}
+        flight = Flight(load_mission(mission("real", seed=seed, duration=10.0).resolved(), wind))
+        r = flight.run()
+        assert flight.found == []
+        assert r.outcome == "completed"
+        worst = max(worst, error(r).max())
+    assert 0.02 < worst < 0.3
+    metrics = compute(r)
+    assert metrics["lost_drones"] == 0.0
+    assert np.isnan(metrics["detection_delay_s"])
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {"truth.load_mass_factor": 1.5, "load_control.k_i": [6.0, 6.0, 6.0]},
+        {"truth.cable_length_factor": [1.05, 0.95, 1.0, 1.03]},
+        {"truth.drone_mass_factor": 1.1},
+    ],
+    ids=["load", "cables", "drones"],
+)
+def test_no_false_alarm_with_a_wrong_model(overrides):
+    flight = Flight(load_mission(mission("real", duration=6.0).resolved(), overrides))
+    assert flight.run().outcome == "completed"
+    assert flight.found == []
+
+
+def test_stuck_sensors_of_the_load_are_nobodys_loss():
+    flight, r = fly("real", {"kind": "sensor-stuck", "body": "load", "duration": 0.1})
+    assert flight.found == []
+    assert r.outcome == "completed"
+
+
+def test_a_drone_whose_sensors_stay_stuck_is_dropped():
+    for frozen in (0.0, 0.06):
+        fault = {"kind": "sensor-stuck", "duration": 5.0}
+        flight, r = fly("real", fault, duration=AT + 2.0, detection__frozen=frozen)
+        assert [drone for _, drone in flight.found] == [1]
+        assert r.outcome == "completed"
+    assert flight.found[0][0] - AT == pytest.approx(0.06, abs=0.012)
+    assert error(r).max() < 0.1
+
+
+def test_two_faults_one_after_the_other():
+    table = mission("ideal", n=5, duration=7.0).resolved()
+    table["fault"] = [
+        {"kind": "cable-cut", "at": 2.0, "drone": 4},
+        {"kind": "drone-lost", "at": 4.0, "drone": 0},
+    ]
+    flight = Flight(load_mission(table))
+    r = flight.run()
+    assert [drone for _, drone in flight.found] == [4, 0]
+    assert r.outcome == "completed"
+    assert compute(r)["lost_drones"] == 2.0
+
+
+def test_thresholds_are_settings():
+    """With a huge threshold nobody notices."""
+    flight = Flight(load_mission(mission("ideal", {"kind": "cable-cut"}, duration=3.5).resolved(),
+                                 {"detection.speed": 10.0}))  # fmt: skip
+    flight.run()
+    assert flight.found == []
+    assert Residuals().params(colift.team.Team.uniform(3)).size == 11
+
+
+# ---------------------------------------------------------------- controlled descent
+
+
+def test_descent_is_smooth_starts_as_told_and_ends_at_rest():
+    part = Descent(position=(1.0, 2.0, 3.0), velocity=(0.5, -0.4, 0.2), at=2.0, rate=0.5, ease=1.5)
+    times = np.linspace(1.9, 14.0, 12_101)
+    x = part.sample(times)
+    np.testing.assert_allclose(part.sample(np.array([2.0]))[0, :2], [[1, 2, 3], [0.5, -0.4, 0.2]])
+    np.testing.assert_allclose(x[-1, 0, 2], part.height, atol=1e-9)
+    np.testing.assert_allclose(x[-1, 1:], 0.0, atol=1e-9)
+    middle = np.argmin(np.abs(times - 5.0))
+    np.testing.assert_allclose(x[middle, 1], [0.0, 0.0, -0.5], atol=1e-9)
+    for order in range(2):  # each row is the derivative of the one above
+        slope = np.gradient(x[200:, order], times[200:], axis=0)
+        np.testing.assert_allclose(slope[2:-2], x[202:-2, order + 1], atol=2e-3)
+
+
+def too_heavy():
+    """Three drones within the tension limit hold 0.225 kg, two do not."""
+    limit = {"allocation.tension_max": 1.1, "drones.count": 3}
+    return load_mission(mission("ideal", {"kind": "cable-cut"}, duration=12.0).resolved(), limit)
+
+
+def test_the_load_comes_down_when_the_rest_cannot_carry_it():
+    flight = Flight(too_heavy())
+    r = flight.run()
+    assert "tension_max" in flight.descent
+    assert r.outcome == flight.descent
+    assert r.outcome.startswith("descended from t = 3.")
+    assert r["reference"][-1, 0, 2] == pytest.approx(Descent().height, abs=1e-6)
+    assert (r["reference"][r.time > AT + 1.5, 1, 2] <= 1e-9).all()
+    metrics = compute(r)
+    assert metrics["min_height_m"] == pytest.approx(r["load"][:, 0, 2].min())
+    assert metrics["min_height_m"] > 0.0
+    arrived = np.argmax(r["load"][:, 0, 2] < 0.15)
+    assert arrived > 0
+    assert abs(r["load"][arrived, 1, 2]) < 1.5 * Descent().rate
+
+
+def test_the_load_is_not_brought_down_while_the_rest_can():
+    flight, r = fly("ideal", {"kind": "cable-cut"})
+    assert flight.descent == ""
+    assert r.outcome == "completed"
+
+
+def test_weak_motors_bring_it_down_too():
+    heavy = {"load.mass": 0.8, "allocation.tension_max": 8.0, "actuation.max_thrust": 1.75,
+             "allocation.mu": 1.2}  # fmt: skip
+    flight = Flight(load_mission(mission("real", n=4).resolved(), heavy))
+    assert flight._cannot_carry([0, 1, 2, 3]) == ""
+    assert "3 drones lift less than 0.6407 kg" in flight._cannot_carry([0, 1, 2])

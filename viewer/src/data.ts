@@ -1,0 +1,259 @@
+// A flight as rows of numbers. Replay fills it at once, live appends to it; everything else only reads.
+
+import type { Mark } from "./events";
+
+export interface Packed {
+  shape: number[];
+  data: string;
+}
+
+export interface Metric {
+  name: string;
+  meaning: string;
+  unit: string;
+  value: number | null;
+}
+
+export interface FlightInfo {
+  name: string;
+  label: string;
+  description: string;
+  level: string;
+  verdict: string;
+  n: number;
+  cable_lengths: number[];
+  safe_angle_deg: number;
+  /** Weight of the load and mean thrust of a drone, N: they set the length of arrows. */
+  weight: number;
+  thrust: number;
+  facts: Record<string, string>;
+  metrics: Metric[];
+  mission: string;
+}
+
+export interface FlightData extends FlightInfo {
+  events: Mark[];
+  time: Packed;
+  signals: Record<string, Packed>;
+}
+
+export interface Payload {
+  format: number;
+  flights: FlightData[];
+  view: { theme?: string; camera?: string; bare?: boolean };
+}
+
+/** Rows of equal width in one growing array. */
+export class Column {
+  rows = 0;
+  constructor(
+    readonly width: number,
+    public data: Float32Array | Float64Array = new Float32Array(64 * width),
+  ) {}
+
+  static of(width: number, data: Float32Array | Float64Array): Column {
+    const column = new Column(width, data);
+    column.rows = data.length / width;
+    return column;
+  }
+
+  push(values: ArrayLike<number>): void {
+    const end = (this.rows + 1) * this.width;
+    if (end > this.data.length) {
+      const grown = this.data instanceof Float64Array ? new Float64Array(2 * end) : new Float32Array(2 * end);
+      grown.set(this.data);
+      this.data = grown;
+    }
+    this.data.set(values, this.rows * this.width);
+    this.rows += 1;
+  }
+
+  at(row: number, k = 0): number {
+    return this.data[row * this.width + k]!;
+  }
+}
+
+/** Every signal of a row, and its width for n drones. */
+export const WIDTHS = {
+  reference: () => 3,
+  load: () => 3,
+  force: () => 3,
+  external: () => 3,
+  positions: (n: number) => 3 * n,
+  attitudes: (n: number) => 4 * n,
+  directions: (n: number) => 3 * n,
+  tensions: (n: number) => n,
+  desired_tensions: (n: number) => n,
+  thrusts: (n: number) => n,
+  solve_time: () => 1,
+  status: () => 1,
+};
+
+export type Signal = keyof typeof WIDTHS;
+/** Signals that the page computes from a row. */
+export type Derived = "error" | "angle" | "spin";
+
+export const SIGNALS = Object.keys(WIDTHS) as Signal[];
+export type Row = Record<Signal, ArrayLike<number>>;
+export type Frame = Record<Signal | Derived, Float32Array> & { time: number; row: number; n: number };
+
+/** Above so many drones no pair of cables is looked at. */
+export const MOST_PAIRED = 64;
+
+export class Flight {
+  readonly time = new Column(1, new Float64Array(64));
+  readonly columns: Record<Signal | Derived, Column>;
+  events: Mark[] = [];
+  /** Where the pilot drags the load to, while he does. */
+  target: [number, number, number] | null = null;
+  /** Grows with every change of the rows. */
+  version = 0;
+  /** End of the colour scale of tension, N: twice a cable's share of the load, the same however it flies. */
+  readonly full: number;
+
+  constructor(readonly info: FlightInfo) {
+    this.full = (2 * info.weight) / info.n || 1;
+    const columns = { error: new Column(1), angle: new Column(1), spin: new Column(info.n) } as Flight["columns"];
+    for (const name of SIGNALS) columns[name] = new Column(WIDTHS[name](info.n));
+    this.columns = columns;
+  }
+
+  static unpack(data: FlightData): Flight {
+    const flight = new Flight(data);
+    const time = new Float64Array(bytes(data.time.data));
+    const given = SIGNALS.map((name) => new Float32Array(bytes(data.signals[name]!.data)));
+    for (let row = 0; row < time.length; row++) {
+      const values = {} as Row;
+      SIGNALS.forEach((name, k) => {
+        const width = WIDTHS[name](data.n);
+        values[name] = given[k]!.subarray(row * width, (row + 1) * width);
+      });
+      flight.append(time[row]!, values);
+    }
+    flight.events = data.events;
+    return flight;
+  }
+
+  get n(): number {
+    return this.info.n;
+  }
+  get rows(): number {
+    return this.time.rows;
+  }
+  get start(): number {
+    return this.rows ? this.time.at(0) : 0;
+  }
+  get end(): number {
+    return this.rows ? this.time.at(this.rows - 1) : 0;
+  }
+
+  append(time: number, values: Row): void {
+    const { columns, n } = this;
+    const step = this.rows ? time - this.end : 0;
+    for (const name of SIGNALS) columns[name].push(values[name]);
+    const { load, reference, directions, thrusts } = values;
+    columns.error.push([Math.hypot(load[0]! - reference[0]!, load[1]! - reference[1]!, load[2]! - reference[2]!)]);
+    columns.angle.push([n > MOST_PAIRED ? NaN : closest(directions, n).angle]);
+    const spin = new Float32Array(n);
+    for (let i = 0; i < n; i++) {
+      const before = this.rows ? columns.spin.at(this.rows - 1, i) : i;
+      // The rotors turn slower than real ones, so that the eye can follow them.
+      const rate = Number.isFinite(thrusts[i]) ? 8 * Math.sqrt(Math.max(thrusts[i]!, 0) / 5) : 8;
+      spin[i] = (before + rate * step) % (200 * Math.PI);
+    }
+    columns.spin.push(spin);
+    this.time.push([time]);
+    this.version += 1;
+  }
+
+  clear(): void {
+    this.time.rows = 0;
+    for (const column of Object.values(this.columns)) column.rows = 0;
+    this.events = [];
+    this.version += 1;
+  }
+
+  /** Last row at or before a time. */
+  rowAt(time: number): number {
+    let low = 0;
+    let high = this.rows - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.time.at(middle) <= time) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  /** The state at a time, between two rows by straight lines; what one of the two lacks is the earlier's. */
+  sample(time: number): Frame {
+    const row = this.rowAt(time);
+    const next = Math.min(row + 1, this.rows - 1);
+    const span = this.time.at(next) - this.time.at(row);
+    const part = span > 0 ? Math.min(Math.max((time - this.time.at(row)) / span, 0), 1) : 0;
+    const frame = { time, row, n: this.n } as Frame;
+    for (const name of Object.keys(this.columns) as (Signal | Derived)[]) {
+      const { width, data } = this.columns[name];
+      const values = new Float32Array(width);
+      for (let k = 0; k < width; k++) {
+        const a = data[row * width + k]!;
+        const b = data[next * width + k]!;
+        const mixed = a + part * (b - a);
+        values[k] = Number.isNaN(mixed) || (name === "spin" && b < a) ? a : mixed;
+      }
+      frame[name] = values;
+    }
+    if (part > 0) turn(frame.attitudes, this.columns.attitudes, row, next, part);
+    frame.status[0] = this.columns.status.at(row);
+    return frame;
+  }
+}
+
+/** Attitudes between two rows: quaternions of opposite sign are the same attitude. */
+function turn(out: Float32Array, column: Column, row: number, next: number, part: number): void {
+  for (let i = 0; i < out.length; i += 4) {
+    let dot = 0;
+    for (let k = i; k < i + 4; k++) dot += column.at(row, k) * column.at(next, k);
+    if (Number.isNaN(dot)) continue;
+    const other = dot < 0 ? -part : part;
+    let norm = 0;
+    for (let k = i; k < i + 4; k++) {
+      out[k] = (1 - part) * column.at(row, k) + other * column.at(next, k);
+      norm += out[k]! ** 2;
+    }
+    for (let k = i; k < i + 4; k++) out[k]! /= Math.sqrt(norm) || 1;
+  }
+}
+
+export interface Pair {
+  one: number;
+  other: number;
+  angle: number;
+}
+
+export function angleBetween(directions: ArrayLike<number>, i: number, j: number): number {
+  const [a, b, c] = [directions[3 * i]!, directions[3 * i + 1]!, directions[3 * i + 2]!];
+  const [d, e, f] = [directions[3 * j]!, directions[3 * j + 1]!, directions[3 * j + 2]!];
+  const cross = Math.hypot(b * f - c * e, c * d - a * f, a * e - b * d);
+  return (Math.atan2(cross, a * d + b * e + c * f) * 180) / Math.PI;
+}
+
+/** The pair of cables with the smallest angle, deg; NaN when there is none. */
+export function closest(directions: ArrayLike<number>, n: number): Pair {
+  const found: Pair = { one: -1, other: -1, angle: NaN };
+  for (let i = 0; i < n; i++) {
+    for (let j = i + 1; j < n; j++) {
+      const angle = angleBetween(directions, i, j);
+      if (angle < found.angle || (Number.isNaN(found.angle) && !Number.isNaN(angle)))
+        Object.assign(found, { one: i, other: j, angle });
+    }
+  }
+  return found;
+}
+
+function bytes(text: string): ArrayBuffer {
+  const raw = atob(text);
+  const buffer = new Uint8Array(raw.length);
+  for (let k = 0; k < raw.length; k++) buffer[k] = raw.charCodeAt(k);
+  return buffer.buffer;
+}
