@@ -263,5 +263,5 @@ def test_settings_that_cannot_work_are_refused(section, settings, problem):
 def test_a_delay_cannot_outgrow_its_buffer_in_flight():
     flight = Flight(load_mission(noisy_table()))
     flight.change("sensing.load_delay", 0.009)
-    with pytest.raises(ColiftError, match="cannot change in flight"):
+    with pytest.raises(ColiftError, match="cannot change like this in flight"):
         flight.change("sensing.load_delay", 0.5)
