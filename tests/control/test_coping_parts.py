@@ -1,0 +1,188 @@
+"""Controllers that cope: what they learn, observe and predict, each against what must come out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import colift
+from colift.estimation.predictor import Predictor, steady_gains
+from colift.load_control.adaptive import Adaptive
+from colift.mission import load_mission
+from colift.simulation.flight import Flight
+from colift.team import Team
+
+PERIOD = 0.01
+HOVER = {
+    "name": "hover", "reference": {"kind": "hover"},
+    "timing": {"duration": 20.0, "load_control": PERIOD, "allocation": PERIOD,
+               "position_control": PERIOD, "attitude_control": PERIOD},
+    "load_control": {"kind": "adaptive", "delay": 0.0},
+    "position_control": {"kind": "disturbance-observer", "delay": 0.0},
+    "attitude_control": {"kind": "delay-aware", "delay": 0.0},
+}  # fmt: skip
+
+
+# ---------------------------------------------------------------- the learned mass
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.8, 1.5])
+def test_the_mass_of_the_load_is_learned(factor):
+    flight = Flight(load_mission(HOVER, {"truth.load_mass_factor": factor}))
+    flight.run()
+    learned = 1.0 + flight._legs[-1].memory.load_control[0]
+    assert learned == pytest.approx(factor, rel=0.02)
+    error = flight.bus.load[0] - flight.bus.reference[0]
+    assert np.linalg.norm(error) < 2e-3
+
+
+def test_the_learned_mass_stays_in_its_bounds_whatever_happens():
+    part, team = Adaptive(lower=0.6, upper=1.4), Team.uniform(4)
+    params, memory, force = part.params(team), part.memory(team), np.zeros(3)
+    reference = np.zeros((4, 3))
+    for direction, bound in ((-1.0, 1.4), (1.0, 0.6)):
+        load = np.array([[0.3, -0.2, direction], [0.0, 0.0, 0.5 * direction]])
+        for _ in range(20_000):  # a disturbance that never ends
+            type(part).kernel(load, reference, PERIOD, params, memory, force)
+        assert 1.0 + memory[0] == pytest.approx(bound)
+        lean = math.hypot(force[0], force[1]) / force[2]
+        assert lean <= math.tan(math.radians(part.max_lean_deg)) * (1.0 + 1e-12)
+        assert force[2] > 0.0
+
+
+def test_without_an_error_the_law_is_weight_and_acceleration():
+    part, team = Adaptive(), Team.uniform(4)
+    force, reference = np.zeros(3), np.zeros((4, 3))
+    reference[2] = [0.7, -0.4, 0.2]
+    type(part).kernel(
+        reference[:2].copy(), reference, PERIOD, part.params(team), part.memory(team), force
+    )
+    np.testing.assert_allclose(force, team.load_mass * (reference[2] + [0.0, 0.0, team.gravity]))
+
+
+# ---------------------------------------------------------------- the observed wind
+
+
+def test_a_steady_wind_on_the_drones_leaves_no_error():
+    wind = [{"kind": "wind", "speed": 6.0, "ramp": 1.0}, {"kind": "drag"}]
+    with_it, without = (
+        colift.run(HOVER, overrides={"disturbance": wind, **change}).recording
+        for change in ({}, {"position_control.observer_limit": 0.0})
+    )
+    late = with_it.time > 15.0
+    errors = [
+        np.linalg.norm(r["load"][late, 0] - r["reference"][late, 0], axis=1).max()
+        for r in (with_it, without)
+    ]
+    assert errors[0] < 2e-3
+    assert errors[0] < 0.3 * errors[1]
+
+
+# ---------------------------------------------------------------- the prediction
+
+
+def test_steady_gains_solve_the_riccati_equation():
+    T, position, velocity, walk = 0.005, 0.002, 0.02, 1.0
+    K, surprise = steady_gains(T, position, velocity, walk)
+    # A filter with these gains, simulated: its surprises have the promised size.
+    rng, F = np.random.default_rng(0), np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1.0]])
+    truth, guess, seen = np.zeros(3), np.zeros(3), []
+    for _ in range(60_000):
+        jerk = rng.normal() * walk / math.sqrt(T)
+        truth = F @ truth + np.array([T**3 / 6.0, T**2 / 2.0, T]) * jerk
+        guess = F @ guess
+        z = truth[:2] + rng.normal(size=2) * [position, velocity]
+        seen.append(z - guess[:2])
+        guess = guess + K @ seen[-1]
+    assert np.std(seen[1000:], axis=0) == pytest.approx(surprise, rel=0.03)
+
+
+class Watched:
+    """A predictor and one drone beside a load at rest; both are measured ``late`` steps after they moved."""
+
+    def __init__(self, part: Predictor, late: int, n: int = 1) -> None:
+        self.part, self.late, self.team = part, late, Team.uniform(n)
+        self.params, self.memory = part.params(self.team), part.memory(self.team)
+        self.out = [np.zeros((2, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 3))]  # fmt: skip
+
+    def look(self, k, load, positions, velocities, thrusts, tensions, directions):
+        n = self.team.n
+        attitudes = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+        type(self.part).kernel(
+            k, 1e-3, load, positions, velocities, attitudes, np.zeros((n, 3)), thrusts, tensions,
+            directions, self.params, self.memory, *self.out,
+        )  # fmt: skip
+
+
+def test_what_thrust_and_tension_explain_is_predicted_exactly():
+    late, h = 20, 1e-3
+    part = Predictor(delay=late * h, attitude_delay=0.0, period=0.005)
+    watched = Watched(part, late)
+    m, g = watched.team.masses[0], watched.team.gravity
+    thrust, tension, alpha = m * g + 1.0, 0.3, np.array([[0.0, 0.6, -0.8]])
+    acceleration = np.array([0.0, 0.0, thrust / m - g]) + tension * alpha[0] / m
+    load_pull = -tension * alpha[0] / watched.team.load_mass - [0.0, 0.0, g]
+
+    def at(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        t = k * h
+        return 0.5 * t * t * acceleration, t * acceleration, 0.5 * t * t * load_pull, t * load_pull
+
+    for k in range(1500):
+        x, v, xl, vl = at(max(k - late, 0) // 5 * 5)
+        watched.look(
+            k, np.array([xl, vl]), x[None], v[None], np.array([thrust]), np.array([tension]), alpha
+        )
+    x, v, xl, vl = at(1499)
+    np.testing.assert_allclose(watched.out[1][0], x, atol=2e-3)
+    np.testing.assert_allclose(watched.out[2][0], v, atol=5e-3)
+    np.testing.assert_allclose(watched.out[0], [xl, vl], atol=2e-2)
+    # The measurement alone is far off.
+    assert np.linalg.norm(at(1479)[2] - xl) > 0.1
+
+
+def test_the_load_is_found_from_the_drones_alone():
+    changes = {"estimation": {"kind": "predictor", "delay": 0.0, "attitude_delay": 0.0}}
+    for source, limit in (("sensor", 0.02), ("cables", 0.03)):
+        flight = Flight(load_mission(HOVER, {**changes, "estimation.load_from": source}))
+        recording = flight.run()
+        late = recording.time > 5.0
+        off = recording["estimated_load"][late, 0] - recording["load"][late, 0]
+        assert np.linalg.norm(off, axis=1).max() < limit, source
+
+
+def test_absurd_measurements_leave_finite_estimates():
+    part = Predictor()
+    watched, rng = Watched(part, 0, n=3), np.random.default_rng(0)
+    for k in range(500):
+        size = 10.0 ** rng.uniform(-3.0, 6.0)
+        watched.look(
+            k, size * rng.normal(size=(2, 3)), size * rng.normal(size=(3, 3)),
+            size * rng.normal(size=(3, 3)), size * rng.random(3), size * rng.random(3),
+            rng.normal(size=(3, 3)),
+        )  # fmt: skip
+        assert all(np.isfinite(each).all() for each in watched.out)
+
+
+# ---------------------------------------------------------------- all of them together
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_the_real_world_is_coped_with(seed, factor):
+    """10 m/s of wind with gusts, 20 ms of delay at 100 Hz, noise and half the load unknown."""
+    run = colift.run("real-world", seed=seed, truth__load_mass_factor=factor)
+    judged = colift.metrics.judge(run.recording, run.metrics)
+    assert len(judged) == 4
+    assert all(each.holds for each in judged), judged
+
+
+def test_a_cable_cut_on_top_of_it_is_survived():
+    fault = [{"kind": "cable-cut", "at": 6.5, "drone": 1}]
+    flight = Flight(load_mission("real-world", {"fault": fault, "seed": 3}))
+    r = flight.run()
+    assert r.outcome == "completed"
+    assert [drone for _, drone in flight.found] == [1]
+    error = np.linalg.norm(r["load"][:, 0] - r["reference"][:, 0], axis=1)
+    assert error[r.time > 9.5].max() < 0.15
