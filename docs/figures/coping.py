@@ -12,32 +12,19 @@ from typing import Any
 import numpy as np
 
 import colift
+from colift.campaign import stress
 
 Overrides = dict[str, Any]
 
-CALM: Overrides = {
-    "truth.load_mass_factor": 1.0, "disturbance": [], "sensing.kind": "noisy", "detection.kind": "none",
-}  # fmt: skip
-SENSORS = ("load", "tracking", "attitude", "rates")
-PROMPT: Overrides = {f"sensing.{sensor}_delay": 0.0 for sensor in SENSORS}
-LATE: Overrides = {f"sensing.{sensor}_delay": 0.02 for sensor in SENSORS}
-QUIET: Overrides = {
-    f"sensing.{name}_noise": 0.0
-    for name in ("load_position", "load_velocity", "position", "velocity", "rates")
-} | {"sensing.attitude_noise_deg": 0.0, "sensing.attitude_bias": 0.0}
-WIND: Overrides = {"disturbance": colift.load_mission("real-world").resolved()["disturbance"]}
 LAG = 0.02
 MOTORS: Overrides = {"actuation.kind": "motors", "actuation.time_constant": LAG}
 LAYERS = ("attitude_control", "position_control", "load_control", "estimation")
 
 CASES: dict[str, Overrides] = {
-    "20 ms of delay": {**CALM, **LATE, **QUIET},
-    "noise and delay": {**CALM, **LATE},
-    "wind": {**CALM, **LATE, **QUIET, **WIND},
-    "load +50 %": {**CALM, **LATE, **QUIET, "truth.load_mass_factor": 1.5},
-    "load -50 %": {**CALM, **LATE, **QUIET, "truth.load_mass_factor": 0.5},
-    "all, load +50 %": {},
-    "all, load -50 %": {"truth.load_mass_factor": 0.5},
+    name: {**stress.UNTOUCHED, **stress.WEATHER[name], "detection.kind": "none"}
+    for name in stress.WEATHER
+    if name != "radio"
+} | {
     "all and motors, +50 %": MOTORS,
     "all and motors, -50 %": {**MOTORS, "truth.load_mass_factor": 0.5},
 }

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from colift.allocation.base import Status
 from colift.geometry import pairwise_angles
+from colift.mission.schema import Bound
 from colift.recording import Recording
 
 
@@ -94,15 +95,18 @@ class Judgement:
 
 
 def judge(recording: Recording, values: Mapping[str, float]) -> list[Judgement]:
-    """The mission's criteria against the flight; first of all, that it was completed.
+    """The mission's criteria against the flight; empty for a mission without criteria."""
+    return against(recording.mission.criteria, recording.outcome, values)
 
-    Empty for a mission without criteria.
-    """
-    criteria = recording.mission.criteria
+
+def against(
+    criteria: Mapping[str, Bound], outcome: str, values: Mapping[str, float]
+) -> list[Judgement]:
+    """Criteria against a flight's outcome and metrics; first of all, that it was completed."""
     if not criteria:
         return []
-    finished = recording.outcome == "completed"
-    return [Judgement("outcome", float(finished), recording.outcome, finished)] + [
+    finished = outcome == "completed"
+    return [Judgement("outcome", float(finished), outcome, finished)] + [
         Judgement(name, values[name], str(bound), bound.holds(values[name]))
         for name, bound in criteria.items()
     ]

@@ -98,7 +98,7 @@ def write_contest(
         own = [row for row in contest if row["mission"] == mission]
         body += [f"<h3>{escape(mission)}</h3>", _html_table(*contest_table(own, criteria))]
     body += ["<h2>How the numbers are made</h2>", _rules(criteria)]
-    body += [*_failures(contest), *_provenance(command)]
+    body += [*_failures(contest), *provenance(command)]
     return _write(folder, "Allocators compared", body, drawings)
 
 
@@ -131,7 +131,7 @@ def write_sweep(title: str, swept: Swept, folder: Path, *, command: str) -> Path
         "<h2>Numbers</h2>",
         *(f"<h3>{name}</h3>{_html_table(head, rows)}" for name, head, rows in sweep_tables(swept)),
         *_failures(swept.rows),
-        *_provenance(command),
+        *provenance(command),
     ]
     return _write(folder, title, body, drawings)
 
@@ -181,7 +181,8 @@ def _labels(row: Row) -> str:
     return ", ".join(f"{name} {row[name]}" for name in names[: names.index("key")])
 
 
-def _provenance(command: str) -> list[str]:
+def provenance(command: str) -> list[str]:
+    """How to repeat a campaign, and with which versions it was flown."""
     text = "\n".join(f"{name:9} {value}" for name, value in versions().items())
     return [
         "<h2>Provenance</h2>",

@@ -1,0 +1,220 @@
+"""The campaign behind ``colift stress``: what can go wrong x allocators x plants x seeds, against criteria."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from colift import metrics
+from colift.campaign.plan import Case, Labels
+from colift.errors import UnknownNameError
+from colift.mission.load import load_mission
+from colift.mission.schema import Bound, Mission
+from colift.survival import FAULTS, WHOLE_TEAM
+
+Overrides = dict[str, Any]
+Row = Mapping[str, Any]
+
+UNTOUCHED: Overrides = {
+    "truth": {}, "sensing": {"kind": "ideal"}, "link": {"kind": "ideal"},
+    "actuation": {"kind": "ideal"}, "disturbance": [], "fault": [],
+}  # fmt: skip
+"""A world in which nothing goes wrong. Every condition is this with something changed."""
+
+WIND = [
+    {"kind": "wind", "speed": 10.0, "heading_deg": 30.0},
+    {"kind": "dryden", "speed": 10.0, "heading_deg": 30.0},
+    {"kind": "gust", "peak": [4.0, 3.0, 1.0], "at": 3.0, "every": 3.0},
+    {"kind": "drag"},
+]
+LATE = {f"{sensor}_delay": 0.02 for sensor in ("load", "tracking", "attitude", "rates")}
+EXACT = {
+    **dict.fromkeys(
+        ("load_position_noise", "load_velocity_noise", "position_noise", "velocity_noise"), 0.0
+    ),
+    "rates_noise": 0.0, "attitude_noise_deg": 0.0, "attitude_bias": 0.0,
+}  # fmt: skip
+NOISY = {"kind": "noisy", **LATE}
+
+WEATHER: dict[str, Overrides] = {
+    "calm": {},
+    "delay": {"sensing": {**NOISY, **EXACT}},
+    "noise": {"sensing": NOISY},
+    "wind": {"disturbance": WIND, "sensing": {**NOISY, **EXACT}},
+    "radio": {"link": {"kind": "radio"}, "sensing": NOISY},
+    "load +50 %": {"truth": {"load_mass_factor": 1.5}, "sensing": NOISY},
+    "load -50 %": {"truth": {"load_mass_factor": 0.5}, "sensing": NOISY},
+    "all, load +50 %": {"truth": {"load_mass_factor": 1.5}, "sensing": NOISY, "disturbance": WIND},
+    "all, load -50 %": {"truth": {"load_mass_factor": 0.5}, "sensing": NOISY, "disturbance": WIND},
+}
+"""Conditions without a fault; delay and noise are those of ``noisy`` sensors, 20 ms late."""
+
+FAULT_AT = 6.0
+"""When the fault of a condition happens, s; at the drone of the seed's number."""
+
+DEFAULT_CRITERIA: dict[str, dict[str, float]] = {
+    "tracking_max_m": {"max": 0.15},
+    "min_angle_deg": {"min": 20.0},
+    "min_height_m": {"min": 0.0},
+}
+"""For a mission that has no criteria of its own."""
+
+
+def condition_names() -> list[str]:
+    """Every condition, those without a fault first."""
+    return [*WEATHER, *FAULTS]
+
+
+def world(condition: str, seed: int, n: int) -> Overrides:
+    """What a condition makes of a mission's world; a fault comes with delay and noise.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such condition.
+
+    """
+    if condition in WEATHER:
+        return {**UNTOUCHED, **WEATHER[condition]}
+    if condition not in FAULTS:
+        raise UnknownNameError("condition", condition, condition_names())
+    fault = {
+        **FAULTS[condition],
+        "at": FAULT_AT,
+        "drone": 0 if condition in WHOLE_TEAM else seed % n,
+    }
+    return {**UNTOUCHED, "sensing": NOISY, "fault": [fault]}
+
+
+def cases(
+    mission: str,
+    conditions: Sequence[str],
+    allocators: Sequence[str],
+    plants: Sequence[str],
+    seeds: int,
+    changes: Mapping[str, Any] | None = None,
+) -> list[Case]:
+    """Every flight; an empty list of allocators or plants stands for the mission's own.
+
+    The condition replaces the mission's truth, sensing, link, actuation, disturbances and faults; ``changes``
+    come last. The allocator that the mission names keeps its settings there.
+    """
+    loaded = load_mission(mission)
+    criteria = loaded.criteria or DEFAULT_CRITERIA
+    found = []
+    for seed in range(seeds):
+        for condition in conditions:
+            own = {**world(condition, seed, loaded.drones.count), "seed": seed}
+            own["criteria"] = {
+                name: _bound(name, bound, condition) for name, bound in criteria.items()
+            }
+            for allocator in allocators or [loaded.kinds["allocation"]]:
+                for plant in plants or [loaded.kinds["plant"]]:
+                    kinds = {"allocation.kind": allocator, "plant.kind": plant}
+                    labels: Labels = {
+                        "condition": condition, "allocator": allocator, "plant": plant, "seed": seed
+                    }  # fmt: skip
+                    given = {**own, **kinds, **(changes or {})}
+                    found.append(Case(labels, mission, given))
+    return found
+
+
+def _bound(name: str, bound: Bound | dict[str, float], condition: str) -> dict[str, Any]:
+    plain = bound.model_dump(exclude_none=True) if isinstance(bound, Bound) else dict(bound)
+    if name == "lost_drones" and condition in FAULTS and "max" in plain:
+        plain["max"] = max(plain["max"], 1.0)  # the one that breaks may leave
+    return plain
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How one flight stands against its criteria.
+
+    Attributes
+    ----------
+    row : mapping
+        The flight, as the campaign keeps it.
+    mission : Mission
+        As flown.
+    judged : list of Judgement
+        The criteria; empty for a flight that ended in an error.
+
+    """
+
+    row: Row
+    mission: Mission
+    judged: list[metrics.Judgement]
+
+    @property
+    def passed(self) -> bool:
+        return bool(self.judged) and all(each.holds for each in self.judged)
+
+    @property
+    def reason(self) -> str:
+        """Why it failed, in words; empty where it passed."""
+        if not self.judged:
+            return str(self.row["error"])
+        missed = (
+            each.bound
+            if each.metric == "outcome"
+            else f"{each.metric} {each.value:.3g}, not {each.bound}"
+            for each in self.judged
+            if not each.holds
+        )
+        return "; ".join(missed)
+
+
+def verdicts(rows: Iterable[Row], missions: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
+    """Judge rows; ``missions`` has the resolved mission of each key."""
+    found = []
+    for row in rows:
+        mission = load_mission(missions[row["key"]])
+        judged = (
+            metrics.against(mission.criteria, str(row["outcome"]), row)
+            if row["status"] == "flown"
+            else []
+        )
+        found.append(Verdict(row, mission, judged))
+    return found
+
+
+@dataclass(frozen=True)
+class Cell:
+    """All seeds of one condition, allocator and plant."""
+
+    passed: int
+    flown: int
+    worst_m: float
+    """Largest distance of the load from its reference in any of them; infinite if one did not end well."""
+    least_deg: float
+    """Smallest angle between two cables in any of them."""
+
+
+def matrix(found: Sequence[Verdict]) -> dict[str, dict[tuple[str, str], Cell]]:
+    """Cells by condition, then by allocator and plant, in the order in which they were asked for."""
+    groups: dict[str, dict[tuple[str, str], list[Verdict]]] = {}
+    for verdict in found:
+        row = verdict.row
+        cell = groups.setdefault(str(row["condition"]), {})
+        cell.setdefault((str(row["allocator"]), str(row["plant"])), []).append(verdict)
+    return {
+        condition: {place: _cell(each) for place, each in cells.items()}
+        for condition, cells in groups.items()
+    }
+
+
+def _cell(group: Sequence[Verdict]) -> Cell:
+    def value(verdict: Verdict, name: str) -> float:
+        flown = verdict.row["status"] == "flown" and verdict.row["outcome"] == "completed"
+        return float(verdict.row[name]) if flown else math.nan
+
+    errors = [value(verdict, "tracking_max_m") for verdict in group]
+    angles = [value(verdict, "min_angle_deg") for verdict in group]
+    return Cell(
+        passed=sum(verdict.passed for verdict in group),
+        flown=len(group),
+        worst_m=math.inf if any(map(math.isnan, errors)) else max(errors),
+        least_deg=min((angle for angle in angles if not math.isnan(angle)), default=math.nan),
+    )

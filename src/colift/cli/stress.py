@@ -1,0 +1,172 @@
+"""`colift stress`: one mission under everything that can go wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from colift.cli.base import (
+    EXIT_ERROR,
+    EXIT_FAILED,
+    Json,
+    Sets,
+    With,
+    app,
+    emit,
+    loading,
+    new_folder,
+    out,
+    save_json,
+    show_tables,
+)
+from colift.cli.campaign import (
+    FILE,
+    Csv,
+    Parquet,
+    RetryFailed,
+    Scheduler,
+    Workers,
+    command_line,
+    export,
+    flights,
+    show_end,
+)
+
+
+@app.command()
+def stress(
+    mission: Annotated[
+        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
+    ] = "real-world",
+    conditions: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A;B;...", help="Conditions, separated by semicolons.", show_default="all"
+        ),
+    ] = None,
+    allocators: Annotated[
+        str | None,
+        typer.Option(metavar="A,B,...", help="Allocators.", show_default="the mission's"),
+    ] = None,
+    plants: Annotated[
+        str | None, typer.Option(metavar="A,B,...", help="Plants.", show_default="the mission's")
+    ] = None,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Flights of each case; seed k breaks drone k.")
+    ] = 4,
+    sets: Sets = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Result folder.", show_default="runs/stress-DATE-TIME"),
+    ] = None,
+    replays: Annotated[
+        int, typer.Option(min=0, max=1000, help="Most failing flights that get a replay.")
+    ] = 12,
+    strict: Annotated[bool, typer.Option(help="Exit code 4 if any flight fails.")] = False,
+    names: Annotated[bool, typer.Option("--list", help="Name the conditions and end.")] = False,
+    extra: With = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    retry_failed: RetryFailed = False,
+    csv: Csv = None,
+    parquet: Parquet = None,
+    as_json: Json = False,
+) -> None:
+    """Fly one mission under everything that can go wrong, against its criteria.
+
+    Each condition replaces the mission's world: wind, delay, noise, wrong masses, faults. What fails gets a
+    mission file that flies it again and a replay, both linked in the report. With --out DIR of an
+    earlier, perhaps interrupted campaign, only what is missing is flown.
+
+    [bold]Examples[/bold]
+
+      colift stress
+      colift stress my-mission.toml --allocators safe,sqp --plants rigid-cables,slack-cables
+      colift stress --conditions "wind;cable cut" --seeds 20
+    """
+    from colift.mission.load import parse_override
+
+    with loading():
+        from colift.campaign import engine
+        from colift.campaign import stress as study
+        from colift.campaign.plan import Source, plan
+
+        if names:
+            for name in study.condition_names():
+                out.print(escape(name), highlight=False)
+            return
+        sources = [Source.read(path) for path in extra or []]
+        for source in sources:
+            source.load()
+        changes = dict(parse_override(text) for text in sets or [])
+        chosen = (
+            [c.strip() for c in conditions.split(";")] if conditions else study.condition_names()
+        )
+        planned = plan(
+            study.cases(
+                mission, chosen, _several(allocators), _several(plants), seeds, changes
+            ),
+            sources,
+        )  # fmt: skip
+    target = folder or new_folder("stress")
+    with flights("Stressing") as advance:
+        outcome = engine.run(
+            planned,
+            engine.Options(
+                file=target / FILE, workers=workers, scheduler=scheduler,
+                retry_failed=retry_failed, progress=advance,
+            ),
+        )  # fmt: skip
+    from colift.report.stress import matrix_table, write_stress
+
+    missions = {job.key: job.mission for _, job in planned}
+    found = study.verdicts(outcome.rows, missions)
+    files = {
+        "report": write_stress(found, target, command=command_line(), replays=replays),
+        "results": target / FILE,
+    }
+    passed = sum(verdict.passed for verdict in found)
+    result = {
+        "mission": mission,
+        "passed": passed,
+        "flights": len(found),
+        "conditions": {
+            condition: [
+                {
+                    "allocator": allocator, "plant": plant, "passed": cell.passed,
+                    "flights": cell.flown, "worst_m": cell.worst_m, "least_deg": cell.least_deg,
+                }
+                for (allocator, plant), cell in cells.items()
+            ]
+            for condition, cells in study.matrix(found).items()
+        },
+        "failing": [{**_labels(each.row), "reason": each.reason} for each in found if not each.passed],
+        "flown": outcome.flown,
+        "wall_time_s": outcome.wall_time,
+        "workers": outcome.workers,
+        "files": {name: str(path) for name, path in files.items()},
+    }  # fmt: skip
+    save_json(target / "stress.json", result)
+    export(outcome.rows, csv, parquet)
+    if as_json:
+        emit(result)
+    else:
+        show_tables([(f"{mission}: flights that pass", *matrix_table(found))])
+        out.print(f"{passed} of {len(found)} flights pass.")
+        show_end(outcome, files)
+    if any(row["status"] == "failed" for row in outcome.rows):
+        raise typer.Exit(EXIT_ERROR)
+    if strict and passed < len(found):
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _several(text: str | None) -> list[str]:
+    return text.split(",") if text else []
+
+
+def _labels(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: row[name] for name in ("condition", "allocator", "plant", "seed")}

@@ -1,0 +1,123 @@
+"""The page of a stress campaign: the matrix, and every flight that fails one click from its replay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import tomli_w
+
+from colift.campaign.stress import Cell, Verdict, matrix
+from colift.recording import atomic_path
+from colift.report import html
+from colift.report.campaign import provenance
+
+Table = tuple[list[str], list[list[str]]]
+"""Header and rows, as text."""
+
+
+def matrix_table(found: Sequence[Verdict]) -> Table:
+    """One line a condition, one column for each allocator and plant."""
+    cells = matrix(found)
+    places = list(dict.fromkeys(place for row in cells.values() for place in row))
+    several = len({plant for _, plant in places}) > 1
+    heads = [f"{allocator}, {plant}" if several else allocator for allocator, plant in places]
+    lines = [
+        [condition, *(cell_text(row[place]) for place in places)]
+        for condition, row in cells.items()
+    ]
+    return ["condition", *heads], lines
+
+
+def cell_text(cell: Cell) -> str:
+    """Passed of flown, and the worst numbers."""
+    if math.isinf(cell.worst_m):
+        return f"{cell.passed}/{cell.flown}, lost"
+    return f"{cell.passed}/{cell.flown}, {100.0 * cell.worst_m:.1f} cm, {cell.least_deg:.0f}°"
+
+
+def write_stress(
+    found: Sequence[Verdict], folder: Path, *, command: str, replays: int = 12
+) -> Path:
+    """Write ``report.html``, and in ``failing/`` a mission file and, for the first few, a replay of each failure.
+
+    Parameters
+    ----------
+    found : sequence of Verdict
+        Every flight.
+    folder : Path
+        Created if missing.
+    command : str
+        What repeats the campaign.
+    replays : int
+        Most replays; those flights are flown again here.
+
+    """
+    failing = [verdict for verdict in found if not verdict.passed]
+    header, lines = matrix_table(found)
+    cells = [[f"<b>{escape(first)}</b>", *map(_marked, rest)] for first, *rest in lines]
+    criteria = {
+        f"{name} {bound}" for verdict in found for name, bound in verdict.mission.criteria.items()
+    }
+    body = [
+        f"<header><h1>{escape(found[0].mission.name)} under stress</h1>",
+        '<p class="soft">Each condition replaces the mission\'s world; the controllers are told of none of it.'
+        "</p></header>",
+        html.banner(
+            "warn" if failing else "good",
+            f"{len(found) - len(failing)} of {len(found)} flights pass.",
+        ),
+        html.facts([f"{len(lines)} conditions", f"{len(found)} flights", *sorted(criteria)]),
+        "<h2>Matrix</h2>",
+        '<p class="soft">Flights that pass, the largest distance of the load from its reference and the '
+        "smallest angle between two cables in any of them.</p>",
+        html.table(header, cells),
+        "<h2>Flights that fail</h2>",
+        _failures(failing, folder, replays),
+        *provenance(command),
+    ]
+    target = folder / "report.html"
+    with atomic_path(target) as temporary:
+        text = html.page(f"{found[0].mission.name} under stress - colift", "\n".join(body))
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    return target
+
+
+def _marked(text: str) -> str:
+    passed, _, flown = text.partition(",")[0].partition("/")
+    level = "good" if passed == flown else "bad" if passed == "0" else "warn"
+    return f'<span class="{level}" style="color:var(--tone)">{escape(text)}</span>'
+
+
+def _failures(failing: Sequence[Verdict], folder: Path, replays: int) -> str:
+    if not failing:
+        return '<p class="soft">None.</p>'
+    rows = []
+    for k, verdict in enumerate(failing):
+        name = f"failing/{k + 1:03d}"
+        with atomic_path(folder / f"{name}.toml") as temporary:
+            temporary.write_text(tomli_w.dumps(verdict.mission.resolved()), encoding="utf-8")
+        links = f'<a href="{name}.toml">mission</a>'
+        if k < replays and verdict.judged:
+            _write_replay(verdict, folder / f"{name}.html")
+            links = f'<a href="{name}.html">replay</a>, {links}'
+        row = verdict.row
+        where = f"{row['allocator']}, {row['plant']}, seed {row['seed']}"
+        rows.append((escape(str(row["condition"])), escape(where), escape(verdict.reason), links))
+    note = (
+        f"The first {replays} have a replay. " if len(failing) > replays else ""
+    ) + "A mission file flies again with: colift run FILE"
+    return html.table(("Condition", "Flight", "Why", "See"), rows) + (
+        f'<p class="soft">{escape(note)}</p>'
+    )
+
+
+def _write_replay(verdict: Verdict, path: Path) -> None:
+    from colift.runner import run
+    from colift.viewer.data import payload
+    from colift.viewer.page import write_page
+
+    flown = run(verdict.mission)
+    write_page(path, payload([flown.recording], [flown.metrics], [str(verdict.row["allocator"])]))

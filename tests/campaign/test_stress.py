@@ -1,0 +1,166 @@
+"""Missions under stress: the conditions, the matrix, and what is made of flights that fail."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import colift
+from colift.campaign import engine, stress
+from colift.campaign.plan import plan
+from colift.campaign.store import Store
+from colift.errors import UnknownNameError
+from colift.mission import load_mission
+from colift.report.stress import matrix_table, write_stress
+
+SHORT = {"timing.duration": 7.0}
+
+
+def flown(tmp_path, conditions, **options):
+    given = {"allocators": [], "plants": [], "seeds": 1, "changes": SHORT, **options}
+    planned = plan(stress.cases("real-world", conditions, **given))
+    outcome = engine.run(planned, engine.Options(tmp_path / "c.sqlite", workers=1))
+    return stress.verdicts(outcome.rows, {job.key: job.mission for _, job in planned})
+
+
+@pytest.mark.parametrize("condition", stress.condition_names())
+def test_every_condition_is_a_valid_world_for_every_seed(condition):
+    for seed in (0, 5):
+        for mission in ("real-world", "hover"):
+            (case,) = [
+                c
+                for c in stress.cases(mission, [condition], [], [], seed + 1)
+                if c.labels["seed"] == seed
+            ]
+            loaded = load_mission(case.mission, case.overrides)
+            assert loaded.seed == seed
+            faults = loaded.fault
+            assert len(faults) == (condition not in stress.WEATHER)
+            assert all(fault.at == stress.FAULT_AT for fault in faults)
+
+
+def test_an_unknown_condition_is_named_with_the_nearest():
+    with pytest.raises(UnknownNameError, match="did you mean 'wind'"):
+        stress.cases("hover", ["wimd"], [], [], 1)
+
+
+def test_a_condition_replaces_the_whole_world():
+    (case,) = stress.cases("real-world", ["calm"], [], [], 1)
+    loaded = load_mission(case.mission, case.overrides)
+    assert loaded.disturbance == []
+    assert loaded.truth.load_mass_factor == 1.0
+    assert loaded.kinds["sensing"] == "ideal"
+
+
+def test_criteria_are_the_missions_or_sensible_ones():
+    (own,) = stress.cases("real-world", ["calm"], [], [], 1)
+    assert load_mission(own.mission, own.overrides).criteria["tracking_max_m"].max == 0.1
+    (default,) = stress.cases("hover", ["calm"], [], [], 1)
+    assert set(load_mission(default.mission, default.overrides).criteria) == set(
+        stress.DEFAULT_CRITERIA
+    )
+    (broken,) = stress.cases("real-world", ["cable cut"], [], [], 1)
+    assert load_mission(broken.mission, broken.overrides).criteria["lost_drones"].max == 1.0
+    (other,) = stress.cases("hover", ["calm"], [], [], 1, {"criteria.tracking_max_m.max": 0.02})
+    assert load_mission(other.mission, other.overrides).criteria["tracking_max_m"].max == 0.02
+
+
+def test_the_matrix_counts_every_flight(tmp_path):
+    found = flown(
+        tmp_path, ["calm", "wind"], plants=["rigid-cables", "slack-cables"], seeds=2,
+        changes={"timing.duration": 2.0},
+    )  # fmt: skip
+    cells = stress.matrix(found)
+    assert list(cells) == ["calm", "wind"]
+    assert all(cell.flown == 2 for row in cells.values() for cell in row.values())
+    assert sum(cell.passed for row in cells.values() for cell in row.values()) == sum(
+        verdict.passed for verdict in found
+    )
+    header, lines = matrix_table(found)
+    assert header == ["condition", "safe, rigid-cables", "safe, slack-cables"]
+    assert lines[0][1].startswith("2/2, ")
+    errors = [
+        verdict.row["tracking_max_m"]
+        for verdict in found
+        if verdict.row["condition"] == "wind" and verdict.row["plant"] == "rigid-cables"
+    ]
+    assert cells["wind"]["safe", "rigid-cables"].worst_m == max(errors)
+
+
+def test_a_failing_flight_has_a_reason_a_replay_and_a_mission_that_flies_it_again(tmp_path):
+    found = flown(
+        tmp_path, ["calm"], changes={"timing.duration": 2.0, "criteria.min_angle_deg.min": 60.0}
+    )
+    (verdict,) = found
+    assert not verdict.passed
+    assert "min_angle_deg" in verdict.reason
+    assert "not >= 60" in verdict.reason
+    page = write_stress(found, tmp_path, command="colift stress").read_text()
+    assert 'href="failing/001.html"' in page
+    assert "colift-data" in (tmp_path / "failing" / "001.html").read_text()
+    again = colift.run(tmp_path / "failing" / "001.toml")
+    assert again.metrics["tracking_max_m"] == verdict.row["tracking_max_m"]
+
+
+def test_a_lost_flight_counts_as_lost():
+    row = {
+        "status": "flown", "outcome": "diverged before t = 1 s", "tracking_max_m": 0.01,
+        "min_angle_deg": 40.0, "min_height_m": 1.0, "condition": "wind", "allocator": "safe",
+        "plant": "rigid-cables", "seed": 0, "key": "k",
+    }  # fmt: skip
+    mission = load_mission("hover", {"criteria": stress.DEFAULT_CRITERIA}).resolved()
+    found = stress.verdicts([row], {"k": mission})
+    cell = stress.matrix(found)["wind"]["safe", "rigid-cables"]
+    assert (cell.passed, cell.flown, cell.worst_m) == (0, 1, math.inf)
+    assert found[0].reason == "diverged before t = 1 s"
+    assert matrix_table(found)[1] == [["wind", "0/1, lost"]]
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "colift", "stress", "--conditions", "calm;delay", *arguments]
+
+
+def test_the_command_prints_json_and_is_strict_when_asked(tmp_path: Path) -> None:
+    options = ["--seeds", "1", "--set", "timing.duration=1.0", "--out", str(tmp_path), "--json"]
+    done = subprocess.run(command(*options), capture_output=True, text=True, check=True)
+    told = json.loads(done.stdout)
+    assert (told["passed"], told["flights"]) == (2, 2)
+    assert Path(told["files"]["report"]).is_file()
+    hard = [*options, "--strict", "--set", "criteria.min_angle_deg.min=89.0"]
+    done = subprocess.run(command(*hard), capture_output=True, text=True, check=False)
+    assert done.returncode == 4
+    assert len(json.loads(done.stdout)["failing"]) == 2
+
+
+def test_nothing_is_lost_when_it_is_killed_half_way(tmp_path: Path) -> None:
+    options = ["--seeds", "6", "--workers", "1", "--out", str(tmp_path), "--json"]
+    file = tmp_path / "campaign.sqlite"
+
+    def finished() -> int:
+        if not file.exists():
+            return 0
+        with Store(file) as store:
+            return len(store.finished())
+
+    process = subprocess.Popen(command(*options), stdout=subprocess.DEVNULL, start_new_session=True)
+    deadline = time.monotonic() + 120.0
+    while finished() < 3:
+        assert process.poll() is None, "it ended before it could be killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    there = finished()
+    assert there >= 3
+    done = subprocess.run(command(*options), capture_output=True, text=True, check=True)
+    told = json.loads(done.stdout)
+    assert told["flights"] == 12
+    assert told["flown"] == 12 - there
