@@ -173,7 +173,7 @@ class Drones:
 
     def __call__(self, x, v, reference, T, alpha, dt=0.001):
         PositionPid.kernel(
-            x, v, reference, T, alpha, dt, self.params, self.memory,
+            x, v, self.attitudes, self.rates, reference, T, alpha, dt, self.params, self.memory,
             self.forces, self.thrusts, self.attitudes, self.rates,
         )  # fmt: skip
         return self

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flown import Open, Opened, Size, fly, payload_of
+from flown import PATIENCE, Open, Opened, Size, fly, payload_of
 
 from colift.errors import BrowserError
 from colift.recording import Recording
@@ -47,6 +47,7 @@ def open_url(browser: Any) -> Iterator[Open]:
         context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, color_scheme=theme, **options
         )
+        context.set_default_timeout(1e3 * PATIENCE)
         opened = Opened(context.new_page())
         opened.page.on("console", lambda message: opened.said.append(message.text))
         opened.page.on("pageerror", lambda error: opened.said.append(str(error)))

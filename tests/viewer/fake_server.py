@@ -108,6 +108,13 @@ class FakeServer:
             time.sleep(0.02)
         raise AssertionError(f"never told {wanted}, only {self.told}")
 
+    def wait_greeted(self, times: int) -> None:
+        """Until so many pages have said hello and are sent what comes."""
+        end = time.monotonic() + 20.0
+        while self.greeted < times:
+            assert time.monotonic() < end, f"greeted {self.greeted} times"
+            time.sleep(0.02)
+
     def _call(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result(20.0)
 
@@ -141,12 +148,12 @@ class FakeServer:
             told = json.loads(message.data)
             self.told.append(told)
             if told["type"] == "hello":
-                self.greeted += 1
                 role = "steer" if told["token"] == TOKEN else "watch"
                 await socket.send_json({**self.hello, "role": role})
                 if self._past:
                     await socket.send_json(self._past)
                 self._sockets.append(socket)
+                self.greeted += 1
         if socket in self._sockets:
             self._sockets.remove(socket)
         return socket

@@ -15,8 +15,8 @@ from colift.viewer.data import payload
 
 Size = tuple[int, int]
 
-PATIENCE = 30.0
-"""Longest wait for something that happens at once on an idle machine, s."""
+PATIENCE = 120.0
+"""Longest wait for something that happens at once on an idle machine and not on one that is busy, s."""
 
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:

@@ -153,7 +153,7 @@ def test_a_lost_connection_comes_back(
     server.drop()
     steering.wait("document.querySelector('.line').dataset.line === 'lost'")
     steering.wait("document.querySelector('.line').dataset.line === 'open'")
-    assert server.greeted == 2
+    server.wait_greeted(2)
     server.rows(100, 200)
     server.wait_told(type="ack", seq=2)
     assert steering.state()["time"] == pytest.approx(spiral.time[199])

@@ -18,10 +18,13 @@ from colift.tuning import Delays
 YAW = 0.25
 """Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
 
-# params: predicted delay, lag; rho and most angular acceleration (3 each); then J and K_d of each drone (3 each)
-_HEAD = 8
+# params: predicted delay, lag; rho and most angular acceleration (3 each); how long silence is made up for; then
+# J and K_d of each drone (3 each)
+_COAST, _HEAD = 8, 9
 _MOST = 64  # control periods that a predicted delay may last
-_SLOTS = 3 * _MOST + 3  # memory per drone: past torques, newest first; the torque that acts (3)
+# Memory per drone: past torques, newest first; the torque that acts; last measured rate (3 each); time since it changed
+_ACTING, _LAST, _SILENCE = 3 * _MOST, 3 * _MOST + 3, 3 * _MOST + 6
+_SLOTS = 3 * _MOST + 7
 
 
 @inline
@@ -38,16 +41,23 @@ def _spin(params, c, tx, ty, tz, p, q, r):  # type: ignore[no-untyped-def]
 @kernel(SIGNATURE)
 def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: ignore[no-untyped-def]
     n = q.shape[0]
-    span = params[0]
-    # Whole periods of the delay, and what is left over of one more.
-    whole = min(int(span / dt + 1e-9), _MOST - 1)
-    rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
+    past = min(int((params[0] + params[_COAST]) / dt + 1e-9) + 1, _MOST - 1)
     keep = math.exp(-dt / params[1]) if params[1] > 0.0 else 0.0
     linger = (1.0 - keep) * params[1] / dt  # mean over a period of what is left of the old torque
     for i in range(n):
         c = _HEAD + 6 * i
         o = _SLOTS * i
-        act = o + 3 * _MOST
+        act = o + _ACTING
+        silent = True
+        for k in range(3):
+            silent = silent and Omega[i, k] == memory[o + _LAST + k]
+            memory[o + _LAST + k] = Omega[i, k]
+        silence = min(memory[o + _SILENCE] + dt, params[_COAST]) if silent else 0.0
+        memory[o + _SILENCE] = silence
+        # Whole periods of the age of what is measured, and what is left over of one more.
+        span = params[0] + silence
+        whole = min(int(span / dt + 1e-9), _MOST - 1)
+        rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
         w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
         rx, ry, rz = Omega[i, 0], Omega[i, 1], Omega[i, 2]
         for j in range(whole, -1, -1):
@@ -67,7 +77,7 @@ def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: igno
         sign = -1.0 if ew < 0.0 else 1.0
         errors = (sign * ex, sign * ey, sign * ez)
         turning = (rx, ry, rz)
-        for j in range(min(whole + 1, _MOST - 1), 0, -1):
+        for j in range(past, 0, -1):
             for k in range(3):
                 memory[o + 3 * j + k] = memory[o + 3 * (j - 1) + k]
         for k in range(3):
@@ -91,6 +101,7 @@ class DelayAware(AttitudeControlPart, Delays):
     attitude it turns no faster than it can stop. With ``predicted``, attitude and rate are carried
     forward over ``delay`` by Euler's equations and the torques that acted meanwhile (a Smith predictor in
     state space; Manitius and Olbrot 1979, "finite spectrum assignment"), and the motors' lag is inverted.
+    If the measured rate does not change, it is taken to be that much older, up to ``coast``.
     """
 
     kernel = _delay_aware
@@ -100,13 +111,16 @@ class DelayAware(AttitudeControlPart, Delays):
     max_yaw_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
     """Most angular acceleration in yaw, for which rotors have little torque, rad/s^2."""
 
+    coast: Annotated[float, Field(ge=0.0, le=1.0)] = 0.1
+    """How long the attitude is predicted without a new measurement, s."""
+
     def params(self, team: Team) -> Vector:
         rate = self.bandwidths().rate
-        span, lag = (self.delay, self.lag) if self.predicted else (0.0, 0.0)
+        span, lag, coast = (self.delay, self.lag, self.coast) if self.predicted else (0.0, 0.0, 0.0)
         gains = rate * np.array([1.0, 1.0, YAW])
         most = [self.max_acceleration, self.max_acceleration, self.max_yaw_acceleration]
         rows = np.hstack([team.inertias, gains * team.inertias])
-        return np.concatenate([[span, lag], 0.5 * gains, most, rows.ravel()])
+        return np.concatenate([[span, lag], 0.5 * gains, most, [coast], rows.ravel()])
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(_SLOTS * team.n)

@@ -16,10 +16,13 @@ from colift.team import Team
 
 # Parameters before the masses: filter, hold, speed, length, time to learn it, deficit, frozen, gravity.
 _HEAD = 8
-_SLOTS = 24
+_SLOTS = 25
 _LENGTH, _DISTANCE, _SPEED, _V, _P, _CABLE, _THRUST = 1, 2, 3, 4, 7, 10, 11
 _STILL, _LAST = 12, 13  # time without any change; position, velocity, attitude
-_NOW = 23  # whether the distance changes faster than that of a taut cable
+_NOW, _STEADY = (
+    23,
+    24,
+)  # whether the distance changes faster than that of a taut cable; time in which it did not
 
 
 @kernel(SIGNATURE)
@@ -62,14 +65,16 @@ def _judge(  # type: ignore[no-untyped-def]
         memory[o + _SPEED] = keep * memory[o + _SPEED] + (1.0 - keep) * speed
         memory[o + _DISTANCE] = keep * memory[o + _DISTANCE] + (1.0 - keep) * d
 
-        # A taut cable keeps its length, which is learned while it does.
+        # A taut cable keeps its length, which is learned while it does; a slack one says nothing of it.
         changing = abs(memory[o + _SPEED]) > fast
         memory[o + _NOW] = 1.0 if changing else 0.0
         moving += memory[o + _NOW]
         stretch = memory[o + _DISTANCE] - memory[o + _LENGTH]
-        if abs(memory[o + _SPEED]) < 0.5 * fast:
-            memory[o + _LENGTH] += (1.0 - math.exp(-dt / learn)) * stretch
-        apart = changing and memory[o + _SPEED] > 0.0 and stretch > longer
+        if abs(memory[o + _SPEED]) < 0.5 * fast and stretch > -longer:
+            memory[o + _STEADY] = min(memory[o + _STEADY] + dt, learn)
+            memory[o + _LENGTH] += dt / memory[o + _STEADY] * stretch
+        known = memory[o + _STEADY] > 0.5 * learn
+        apart = known and changing and memory[o + _SPEED] > 0.0 and stretch > longer
         memory[o + _CABLE] = memory[o + _CABLE] + dt if apart else 0.0
         weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
         memory[o + _THRUST] = memory[o + _THRUST] + dt if weak else 0.0
@@ -120,7 +125,7 @@ class Residuals(DetectionPart):
     length: Annotated[float, Field(ge=0.0, le=10.0)] = 0.004
     """Length by which they do, m."""
     learning: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    """Time constant with which the cables' lengths are learned, s."""
+    """Time over which a cable's length is averaged, s; after half of it the cable is watched."""
     deficit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
     """Share of the commanded thrust that lacks."""
     frozen: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0

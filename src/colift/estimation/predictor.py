@@ -21,7 +21,7 @@ FINEST = 0.5e-3
 
 # Parameters: then gains (3 by 2) and gates (2) of load and drones, masses, cable lengths.
 _DELAY, _TURN, _LAG, _PERIOD, _PATIENCE, _SMOOTH, _GRAVITY, _LOAD_MASS = 0, 1, 2, 3, 4, 5, 6, 7
-_LOAD, _DRONES, _HEAD = 8, 16, 24
+_STEADY, _COAST, _LOAD, _DRONES, _HEAD = 8, 9, 10, 18, 26
 # Memory of a body: started; time since its last sample; that sample; its state when the sample was taken:
 # position, velocity, unexplained acceleration; attitude, its last sample and that one's age; thrust that acts;
 # ring of known accelerations.
@@ -100,11 +100,13 @@ def _start(o, row, position, velocity, memory):  # type: ignore[no-untyped-def]
 def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-untyped-def]
     """Integrate the measured rate; of a new attitude believe a share of the turn that leads to it."""
     a = o + _ATTITUDE
+    memory[o + _SINCE] += dt
+    # A rate without attitudes beside it has stopped being measured as well.
+    step = dt if memory[o + _SINCE] <= params[_STEADY] + 0.5 * dt else 0.0
     w, x, y, z = quaternion.turn(
         memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
-        rates[i, 0] * dt, rates[i, 1] * dt, rates[i, 2] * dt,
+        rates[i, 0] * step, rates[i, 1] * step, rates[i, 2] * step,
     )  # fmt: skip
-    memory[o + _SINCE] += dt
     fresh = False
     for k in range(4):
         fresh = fresh or attitudes[i, k] != memory[o + _SEEN + k]
@@ -154,7 +156,11 @@ def _predict(  # type: ignore[no-untyped-def]
                 memory[o + _ATTITUDE + k] = memory[o + _SEEN + k] = attitudes[i, k]
         _start(o, i, positions, velocities, memory)
         memory[o + _THRUST] = keep * memory[o + _THRUST] + (1.0 - keep) * thrusts[i]
+        coasting = memory[o + _AGE] <= params[_COAST]
         fresh = _sampled(o, i, params[_PERIOD], dt, memory, positions, velocities)
+        if fresh and not coasting:
+            memory[o] = 0.0
+            _start(o, i, positions, velocities, memory)
         _attitude(o, i, dt, attitudes, rates, params, memory)
         turn, a = params[_TURN], o + _ATTITUDE
         qw, qx, qy, qz = quaternion.turn(
@@ -172,6 +178,9 @@ def _predict(  # type: ignore[no-untyped-def]
             estimated_attitudes[i, k] = memory[a + k]
         for k in range(3):
             estimated_rates[i, k] = rates[i, k]
+        if not (fresh or coasting):
+            continue
+        for k in range(3):
             p, v = _forecast(o, slot, places, dt, memory, k)
             estimated_positions[i, k] = p
             estimated_velocities[i, k] = v
@@ -231,7 +240,8 @@ class Predictor(EstimationPart):
     do not explain (wind, tension errors) is a third state. Attitudes are smoothed by the measured rates but,
     like these, not carried forward: the attitude controller has the torques to do so.
 
-    Without a load measurement for ``patience`` the load is found from the drones and their cables' lengths.
+    Without a load measurement for ``patience`` the load is found from the drones and their cables' lengths. A
+    drone without measurements is carried forward for ``coast``.
     """
 
     kernel = _predict
@@ -256,17 +266,21 @@ class Predictor(EstimationPart):
     """How far the acceleration that nobody commanded walks in a second, m/s^2."""
     attitude_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
     """Time in which the integrated rate is drawn to the measured attitude, s; 0 believes each measurement."""
-    gate: Annotated[float, Field(gt=0.0, le=100.0)] = 5.0
+    gate: Annotated[float, Field(gt=0.0, le=1000.0)] = 100.0
     """Most surprise that a measurement may cause, standard deviations."""
     load_from: Literal["sensor", "cables"] = "sensor"
     """Where the load is known from: its own tracking as long as there is some, or the drones alone."""
     patience: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
     """How long the load's sensor may be silent before the drones fill in, s."""
+    coast: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
+    """How long a drone is carried forward without any new sample, s; then it is left standing, for a detection to see."""
+    steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
+    """How long a measured rate is integrated without a new attitude, s."""
 
     def params(self, team: Team) -> Vector:
         patience = self.patience if self.load_from == "sensor" else -1.0
         head = [self.delay, self.attitude_delay, self.lag, self.period, patience]
-        head += [self.attitude_filter, team.gravity, team.load_mass]
+        head += [self.attitude_filter, team.gravity, team.load_mass, self.steady, self.coast]
         for noise in (
             (self.load_position_noise, self.load_velocity_noise),
             (self.position_noise, self.velocity_noise),

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from colift.jit import inline, kernel
+from colift.math import quaternion
 from colift.math.small import solve_symmetric
 from colift.math.sphere import follow
 from colift.part import Places, Vector, carry_rows
@@ -17,13 +18,26 @@ from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
 from colift.tuning import Delays
 
-# params: g; velocity and position bandwidth; observer bandwidth, its bound over weight, its lag; frequency of
-# the cables; time constant of the thrust's rate; least and most thrust over weight, tangent of the tilt; most
-# acceleration for turning a cable.
-_HEAD = 12  # then m, L
-_AIM = 10  # after started; direction, rate, acceleration (3 each)
-_MOMENTUM, _FORCE, _GUESS = 16, 19, 22  # after u_hat and its rate (3 each)
-_SLOTS = 25
+# params: g; velocity and position bandwidth; observer bandwidth, its bound over weight; lag of the motors; frequency
+# of the cables; time constant of the thrust's rate; least and most thrust over weight, tangent of the tilt; most
+# acceleration for turning a cable; delay of the attitude; most acceleration of the feedback.
+_HEAD = 14  # then m, L
+# Memory per drone: started; direction, its rate and acceleration; thrust direction and its rate; momentum as far as
+# it is explained; force that is observed; common wind (3 each); thrust that acts.
+_DIRECTION, _RATE, _ACCELERATION, _AIM, _MOMENTUM, _FORCE, _WIND, _THRUST = (
+    1,
+    4,
+    7,
+    10,
+    16,
+    19,
+    22,
+    25,
+)
+_SLOTS = 26
+
+DOUBT = 0.05
+"""Difference from the common wind, over a drone's weight, from which its observation counts for little."""
 
 
 @inline
@@ -35,14 +49,14 @@ def _observe(i, n, v, dt, params, memory, o):  # type: ignore[no-untyped-def]
         if memory[o] == 0.0:
             memory[o + _MOMENTUM + k] = m * v[i, k]
         guess = params[3] * (m * v[i, k] - memory[o + _MOMENTUM + k])
-        memory[o + _GUESS + k] = guess
+        memory[o + _FORCE + k] = guess
         size += guess * guess
     bound = params[4] * m * params[0]
     if size > bound * bound:
         shrink = bound / math.sqrt(size)
         for k in range(3):
-            memory[o + _GUESS + k] *= shrink
-            memory[o + _MOMENTUM + k] = m * v[i, k] - memory[o + _GUESS + k] / params[3]
+            memory[o + _FORCE + k] *= shrink
+            memory[o + _MOMENTUM + k] = m * v[i, k] - memory[o + _FORCE + k] / params[3]
 
 
 @inline
@@ -56,66 +70,90 @@ def _limit(i, u, least, most, tangent):  # type: ignore[no-untyped-def]
         u[i, 1] *= room / across
 
 
-@kernel(SIGNATURE)
-def _observe_and_control(  # type: ignore[no-untyped-def]
-    x, v, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
-):
-    n = x.shape[0]
-    g = params[0]
-    keep = math.exp(-dt / params[7]) if params[7] > 0.0 else 0.0
-    # The wind is what the drones feel across their cables; along them it cannot be told from tension.
+@inline
+def _common_wind(n, params, memory):  # type: ignore[no-untyped-def]
+    """The force that all drones feel alike, by weighted least squares.
+
+    It is what they feel across their cables; along them it cannot be told from tension. Whose observation
+    differs much from the last answer counts for little (Cauchy's weight): it has troubles of its own.
+    """
     xx = yy = zz = 1e-6
     xy = xz = yz = bx = by = bz = 0.0
     for i in range(n):
         o = _SLOTS * i
+        a, d, w = o + _DIRECTION, o + _FORCE, o + _WIND
+        ax, ay, az = memory[a], memory[a + 1], memory[a + 2]
+        dx, dy, dz = memory[d], memory[d + 1], memory[d + 2]
+        rx, ry, rz = dx - memory[w], dy - memory[w + 1], dz - memory[w + 2]
+        along = ax * dx + ay * dy + az * dz
+        strange = ax * rx + ay * ry + az * rz
+        scale = DOUBT * params[_HEAD + i] * params[0]
+        s = 1.0 / (1.0 + (rx * rx + ry * ry + rz * rz - strange * strange) / (scale * scale))
+        xx, yy, zz = xx + s * (1.0 - ax * ax), yy + s * (1.0 - ay * ay), zz + s * (1.0 - az * az)
+        xy, xz, yz = xy - s * ax * ay, xz - s * ax * az, yz - s * ay * az
+        bx, by, bz = (
+            bx + s * (dx - along * ax),
+            by + s * (dy - along * ay),
+            bz + s * (dz - along * az),
+        )
+    return solve_symmetric(xx, xy, xz, yy, yz, zz, bx, by, bz)
+
+
+@kernel(SIGNATURE)
+def _observe_and_control(  # type: ignore[no-untyped-def]
+    x, v, q, Omega, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
+):
+    n = x.shape[0]
+    g = params[0]
+    lag = math.exp(-dt / params[5]) if params[5] > 0.0 else 0.0
+    keep = math.exp(-dt / params[7]) if params[7] > 0.0 else 0.0
+    delay = params[12]
+    for i in range(n):
+        o = _SLOTS * i
         if memory[o] == 0.0:
             for k in range(3):
-                memory[o + 1 + k] = alpha[i, k]
+                memory[o + _DIRECTION + k] = alpha[i, k]
         reach = params[11] / (params[6] * params[6] * params[_HEAD + n + i])
-        follow(memory, o + 1, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[6], dt, reach)
+        follow(memory, o + _DIRECTION, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[6], dt, reach)
         _observe(i, n, v, dt, params, memory, o)
-        ax, ay, az = memory[o + 1], memory[o + 2], memory[o + 3]
-        dx, dy, dz = memory[o + _GUESS], memory[o + _GUESS + 1], memory[o + _GUESS + 2]
-        along = ax * dx + ay * dy + az * dz
-        xx, yy, zz = xx + 1.0 - ax * ax, yy + 1.0 - ay * ay, zz + 1.0 - az * az
-        xy, xz, yz = xy - ax * ay, xz - ax * az, yz - ay * az
-        bx, by, bz = bx + dx - along * ax, by + dy - along * ay, bz + dz - along * az
-    wx, wy, wz = solve_symmetric(xx, xy, xz, yy, yz, zz, bx, by, bz)
+    wind = _common_wind(n, params, memory)
     for i in range(n):
         o = _SLOTS * i
         m, L = params[_HEAD + i], params[_HEAD + n + i]
-        d = o + _GUESS
-        missing = (
-            memory[o + 1] * (wx - memory[d])
-            + memory[o + 2] * (wy - memory[d + 1])
-            + memory[o + 3] * (wz - memory[d + 2])
-        )
+        push = missing = 0.0
         for k in range(3):
-            a = memory[o + 1 + k]
+            a, d = memory[o + _DIRECTION + k], memory[o + _FORCE + k]
             x_e = x[i, k] - (reference[0, k] - L * a)
-            v_e = v[i, k] - (reference[1, k] - L * memory[o + 4 + k])
-            acceleration = reference[2, k] - L * memory[o + 7 + k]
-            gravity = g if k == 2 else 0.0
-            u[i, k] = (
-                m * (gravity + acceleration - params[1] * (v_e + params[2] * x_e))
-                - T[i] * a
-                - (memory[d + k] + missing * a)
-            )
-        _limit(i, u, m * g * params[8], m * g * params[9], params[10])
-        # What will act: the thrust behind the attitude's lag, and the cable.
-        follow_up = dt / (dt + params[5])
+            v_e = v[i, k] - (reference[1, k] - L * memory[o + _RATE + k])
+            u[i, k] = -params[1] * (v_e + params[2] * x_e)
+            push += u[i, k] * u[i, k]
+            missing += a * (wind[k] - d)
+        # No more than the attitude can follow: it needs long to turn from one bank to the other.
+        share = min(1.0, params[13] / math.sqrt(max(push, 1e-12)))
         for k in range(3):
-            thrust = memory[o + _FORCE + k]
-            if memory[o] == 0.0:
-                thrust = u[i, k]
-            memory[o + _FORCE + k] = thrust + follow_up * (u[i, k] - thrust)
-            weight = m * g if k == 2 else 0.0
-            memory[o + _MOMENTUM + k] += dt * (
-                memory[o + _FORCE + k] + T[i] * memory[o + 1 + k] - weight + memory[d + k]
-            )
+            a, d = memory[o + _DIRECTION + k], memory[o + _FORCE + k]
+            needed = reference[2, k] - L * memory[o + _ACCELERATION + k] + (g if k == 2 else 0.0)
+            u[i, k] = m * (needed + share * u[i, k]) - T[i] * a - (d + missing * a)
+        _limit(i, u, m * g * params[8], m * g * params[9], params[10])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         fresh = memory[o] == 0.0
         memory[o] = 1.0
+        # What will act: the thrust along the axis that is there, not the one that is wanted; and the cable.
+        thrust = norm if fresh else lag * memory[o + _THRUST] + (1.0 - lag) * norm
+        memory[o + _THRUST] = thrust
+        qw, qx, qy, qz = quaternion.turn(
+            q[i, 0], q[i, 1], q[i, 2], q[i, 3],
+            Omega[i, 0] * delay, Omega[i, 1] * delay, Omega[i, 2] * delay,
+        )  # fmt: skip
+        axis = quaternion.third_axis(qw, qx, qy, qz)
+        for k in range(3):
+            memory[o + _WIND + k] = wind[k]
+            memory[o + _MOMENTUM + k] += dt * (
+                thrust * axis[k]
+                + T[i] * memory[o + _DIRECTION + k]
+                + memory[o + _FORCE + k]
+                - (m * g if k == 2 else 0.0)
+            )
         aim(i, fresh, dt, keep, u, norm, memory, o + _AIM, thrusts, attitudes, rates)
 
 
@@ -126,12 +164,13 @@ class DisturbanceObserver(PositionControlPart, Delays):
     tension do not explain. Only its part across the cable is used as it is: along the cable nobody can tell
     wind from tension, and to integrate there would strain the cables against each other and hide the load's
     true weight. That part is filled in from the wind that all drones feel alike: the force whose parts
-    across all cables fit the observations best.
+    across all cables fit the observations best, and drones that feel something else count little. The thrust is
+    taken along the measured attitude, so a drone that cannot turn at once is not taken for one in the wind.
     """
 
     kernel = _observe_and_control
 
-    observer: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    observer: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     """Bandwidth of the observer over that of the position loop."""
     observer_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.5
     """Bound on the observed force over the drone's weight."""
@@ -139,6 +178,8 @@ class DisturbanceObserver(PositionControlPart, Delays):
     """Natural frequency of the reference filter on the sphere, rad/s."""
     max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
     """Most acceleration that a drone is asked for to turn its cable, m/s^2."""
+    max_push: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
+    """Most acceleration by which place and speed are corrected, m/s^2."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=0.5)] = 0.15
     """Time constant of the derivative of the thrust direction, s."""
     min_thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
@@ -150,11 +191,11 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     def params(self, team: Team) -> Vector:
         band = self.bandwidths()
-        attitude_lag = 0.5 / band.attitude
         head = [team.gravity, band.velocity, band.position]
-        head += [self.observer * band.position, self.observer_limit, attitude_lag, self.frequency]
+        head += [self.observer * band.position, self.observer_limit, self.lag, self.frequency]
         head += [self.thrust_filter, self.min_thrust, self.max_thrust]
         head += [math.tan(math.radians(self.max_tilt_deg)), self.max_swing]
+        head += [self.delay if self.predicted else 0.0, self.max_push]
         return np.concatenate([head, team.masses, team.cable_lengths])
 
     def memory(self, team: Team) -> Vector:

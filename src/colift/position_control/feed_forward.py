@@ -23,7 +23,7 @@ _SLOTS = 19  # memory per drone: started; integral; direction, rate, acceleratio
 
 @kernel(SIGNATURE)
 def _feed_forward(  # type: ignore[no-untyped-def]
-    x, v, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
+    x, v, q, Omega, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
 ):
     n = x.shape[0]
     g = params[0]

@@ -22,7 +22,7 @@ _SLOTS = 16  # memory per drone: started; integral, alpha, alpha rate, u_hat, u_
 
 @kernel(SIGNATURE)
 def _pid(  # type: ignore[no-untyped-def]
-    x, v, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
+    x, v, q, Omega, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
 ):
     n = x.shape[0]
     g = params[0]

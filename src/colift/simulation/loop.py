@@ -241,8 +241,9 @@ def advance(  # type: ignore[no-untyped-def]
 
         if k % every.position_control == 0:
             control_position(
-                bus.estimated_positions, bus.estimated_velocities, bus.reference,
-                bus.received_tensions, bus.received_directions, every.position_control * dt,
+                bus.estimated_positions, bus.estimated_velocities, bus.estimated_attitudes,
+                bus.estimated_rates, bus.reference, bus.received_tensions,
+                bus.received_directions, every.position_control * dt,
                 params.position_control, memory.position_control, bus.drone_forces, bus.thrusts,
                 bus.desired_attitudes, bus.desired_rates,
             )  # fmt: skip

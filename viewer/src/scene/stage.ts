@@ -27,6 +27,7 @@ export class Stage {
   private readonly overlay: Overlay;
   private readonly elements: Element[];
   private frame: Frame | null = null;
+  private sized = false;
 
   constructor(
     flight: Flight,
@@ -79,6 +80,7 @@ export class Stage {
     for (const element of this.elements) element.update(this.frame, this.shown, this.overlay);
     this.overlay.end();
     this.renderer.render(this.scene, this.rig.camera);
+    if (this.sized) this.element.dataset.drawn = "";
   }
 
   /** Where a point of the window meets the level plane at a height, in the world; for dragging. */
@@ -97,8 +99,8 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight);
     this.rig.resize(clientWidth / clientHeight);
+    this.sized = true;
     this.draw();
-    if (this.frame) this.element.dataset.drawn = "";
   }
 }
 
