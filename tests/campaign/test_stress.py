@@ -19,7 +19,7 @@ from colift.campaign.plan import plan
 from colift.campaign.store import Store
 from colift.errors import UnknownNameError
 from colift.mission import load_mission
-from colift.report.stress import matrix_table, write_stress
+from colift.report.stress import matrix_tables, write_stress
 
 SHORT = {"timing.duration": 7.0}
 
@@ -50,6 +50,18 @@ def test_every_condition_is_a_valid_world_for_every_seed(condition):
 def test_an_unknown_condition_is_named_with_the_nearest():
     with pytest.raises(UnknownNameError, match="did you mean 'wind'"):
         stress.cases("hover", ["wimd"], [], [], 1)
+
+
+def test_a_fault_happens_in_the_weather_named_behind_it():
+    (case,) = stress.cases("real-world", ["cable cut in all, load +50 %"], [], [], 1)
+    loaded = load_mission(case.mission, case.overrides)
+    assert loaded.truth.load_mass_factor == 1.5
+    assert len(loaded.disturbance) == len(stress.WIND)
+    assert len(loaded.fault) == 1
+    assert loaded.criteria["lost_drones"].max == 1.0
+    for wrong in ("cable cut in wimd", "cabel cut in wind", "wind in wind", " in wind"):
+        with pytest.raises(UnknownNameError):
+            stress.cases("hover", [wrong], [], [], 1)
 
 
 def test_a_condition_replaces_the_whole_world():
@@ -84,8 +96,8 @@ def test_the_matrix_counts_every_flight(tmp_path):
     assert sum(cell.passed for row in cells.values() for cell in row.values()) == sum(
         verdict.passed for verdict in found
     )
-    header, lines = matrix_table(found)
-    assert header == ["condition", "safe, rigid-cables", "safe, slack-cables"]
+    ((title, header, lines),) = matrix_tables(found)
+    assert (title, header) == ("safe", ["condition", "rigid-cables", "slack-cables"])
     assert lines[0][1].startswith("2/2, ")
     errors = [
         verdict.row["tracking_max_m"]
@@ -121,7 +133,11 @@ def test_a_lost_flight_counts_as_lost():
     cell = stress.matrix(found)["wind"]["safe", "rigid-cables"]
     assert (cell.passed, cell.flown, cell.worst_m) == (0, 1, math.inf)
     assert found[0].reason == "diverged before t = 1 s"
-    assert matrix_table(found)[1] == [["wind", "0/1, lost"]]
+    assert matrix_tables(found) == [
+        ("safe", ["condition", "rigid-cables"], [["wind", "0/1, lost"]])
+    ]
+    other = stress.verdicts([{**row, "allocator": "sqp"}], {"k": mission})
+    assert [title for title, *_ in matrix_tables(found + other)] == ["rigid-cables"]
 
 
 def command(*arguments: str) -> list[str]:

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import colift
+from colift.attitude_control.delay_aware import DelayAware
 from colift.estimation.predictor import Predictor, steady_gains
 from colift.load_control.adaptive import Adaptive
 from colift.mission import load_mission
+from colift.position_control.disturbance_observer import DisturbanceObserver
 from colift.simulation.flight import Flight
 from colift.team import Team
 
@@ -78,6 +80,114 @@ def test_a_steady_wind_on_the_drones_leaves_no_error():
     ]
     assert errors[0] < 2e-3
     assert errors[0] < 0.3 * errors[1]
+
+
+class Observed:
+    """The position controller of n drones that hang free of any load, and the forces that it observes."""
+
+    def __init__(self, n: int, **settings: float) -> None:
+        self.part, self.team = DisturbanceObserver(delay=0.0, **settings), Team.uniform(n)
+        self.params, self.memory = self.part.params(self.team), self.part.memory(self.team)
+        self.velocities = np.zeros((n, 3))
+        self.u, self.thrusts = np.zeros((n, 3)), np.zeros(n)
+        self.attitudes, self.rates = np.zeros((n, 4)), np.zeros((n, 3))
+
+    def fly(self, axes: np.ndarray, pushes: np.ndarray, offset: float = 0.0) -> np.ndarray:
+        """One period with thrust along ``axes`` and forces ``pushes`` (n, 3); the observed forces (n, 3)."""
+        n, g = self.team.n, self.team.gravity
+        half = np.hstack([1.0 + axes[:, 2:], -axes[:, 1:2], axes[:, :1], np.zeros((n, 1))])
+        q = half / np.linalg.norm(half, axis=1, keepdims=True)
+        tilt, height = 0.6, 0.8
+        turn = 2.0 * np.pi * np.arange(n) / n
+        alpha = np.stack([tilt * np.cos(turn), tilt * np.sin(turn), np.full(n, -height)], axis=1)
+        places = -self.team.cable_lengths[:, None] * alpha + [offset, 0.0, 0.0]
+        type(self.part).kernel(
+            places, self.velocities, q, np.zeros((n, 3)), np.zeros((4, 3)), np.zeros(n), alpha, PERIOD,
+            self.params, self.memory, self.u, self.thrusts, self.attitudes, self.rates,
+        )  # fmt: skip
+        pull = self.thrusts[:, None] * axes - self.team.masses[:, None] * [0.0, 0.0, g]
+        self.velocities += PERIOD * (pull + pushes) / self.team.masses[:, None]
+        rows = self.memory.reshape(n, -1)
+        self.wind = rows[0, 22:25]
+        return rows[:, 19:22]
+
+
+def test_a_drone_that_points_elsewhere_is_not_taken_for_one_in_the_wind():
+    observed, angle = Observed(3), np.radians(25.0)
+    axes = np.tile([np.sin(angle), 0.0, np.cos(angle)], (3, 1))
+    for _ in range(30):
+        forces = observed.fly(axes, np.zeros((3, 3)))
+    assert np.linalg.norm(observed.velocities, axis=1).min() > 0.5  # it goes where it points
+    assert np.abs(forces).max() < 1e-9
+
+
+def test_the_wind_is_what_most_drones_feel():
+    wind, lost = np.array([0.8, -0.5, 0.1]), np.array([0.0, 0.0, -2.3])
+    for n in (3, 4, 8):
+        observed = Observed(n)
+        up, pushes = np.tile([0.0, 0.0, 1.0], (n, 1)), np.tile(wind, (n, 1))
+        for _ in range(200):
+            observed.fly(up, pushes)
+        np.testing.assert_allclose(observed.wind, wind, atol=2e-2)
+        pushes[1] += lost
+        for _ in range(15):
+            forces = observed.fly(up, pushes)
+        assert forces[1, 2] < -0.6
+        # A mean would go wrong by as much over n, or more.
+        assert np.linalg.norm(observed.wind - wind) < 0.25 * abs(forces[1, 2]) / n
+
+
+def test_a_drone_far_off_is_pulled_back_no_harder_than_it_can_turn():
+    for offset in (0.5, 50.0):
+        observed = Observed(1, max_push=3.0)
+        observed.fly(np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 3)), offset)
+        m, g = observed.team.masses[0], observed.team.gravity
+        np.testing.assert_allclose(observed.u[0], m * np.array([-3.0, 0.0, g]), atol=1e-9)
+
+
+# ---------------------------------------------------------------- silent sensors
+
+
+def test_an_attitude_is_turned_by_its_torques_while_the_rate_is_not_measured():
+    ends = []
+    for coast in (0.1, 0.0):
+        part, team = DelayAware(delay=0.0, coast=coast), Team.uniform(1)
+        params, memory, tau = part.params(team), part.memory(team), np.zeros((1, 3))
+        angle, rate = 0.3, 0.0
+        seen = (angle, rate)
+        for k in range(30):
+            if k < 20:
+                seen = (angle, rate)
+            q = np.array([[np.cos(0.5 * seen[0]), np.sin(0.5 * seen[0]), 0.0, 0.0]])
+            Omega = np.array([[seen[1], 0.0, 0.0]])
+            wanted = np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 3))
+            type(part).kernel(q, Omega, *wanted, PERIOD, params, memory, tau)
+            torque = tau[0, 0] / team.inertias[0, 0]
+            angle += PERIOD * (rate + 0.5 * PERIOD * torque)
+            rate += PERIOD * torque
+        ends.append((abs(angle), abs(rate)))
+    assert ends[0][0] < 0.1
+    assert ends[0][1] < 0.7
+    assert ends[1][1] > 4.0 * ends[0][1]  # nobody braked
+
+
+def test_a_silent_drone_is_carried_forward_and_then_left_standing():
+    part = Predictor(delay=0.0, attitude_delay=0.0, coast=0.1)
+    watched = Watched(part, 0)
+    m, g = watched.team.masses[0], watched.team.gravity
+    load, alpha = np.zeros((2, 3)), np.array([[0.0, 0.0, -1.0]])
+    seen = []
+    for k in range(1000):
+        silent = 500 <= k < 900
+        x = 1e-3 * (499 if silent else k)
+        watched.look(
+            k, load, np.array([[x, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]]), np.array([m * g]),
+            np.zeros(1), alpha,
+        )  # fmt: skip
+        seen.append(watched.out[1][0, 0])
+    assert seen[560] == pytest.approx(0.560, abs=2e-3)  # at the speed it had
+    assert seen[620] == seen[890] == pytest.approx(0.600, abs=8e-3)
+    assert seen[910] == pytest.approx(0.910, abs=2e-3)  # believed at once
 
 
 # ---------------------------------------------------------------- the prediction
@@ -178,11 +288,24 @@ def test_the_real_world_is_coped_with(seed, factor):
     assert all(each.holds for each in judged), judged
 
 
-def test_a_cable_cut_on_top_of_it_is_survived():
-    fault = [{"kind": "cable-cut", "at": 6.5, "drone": 1}]
+@pytest.mark.parametrize("kind", ["cable-cut", "drone-lost"])
+def test_a_drone_lost_on_top_of_it_is_survived(kind):
+    fault = [{"kind": kind, "at": 6.5, "drone": 1}]
     flight = Flight(load_mission("real-world", {"fault": fault, "seed": 3}))
     r = flight.run()
     assert r.outcome == "completed"
     assert [drone for _, drone in flight.found] == [1]
     error = np.linalg.norm(r["load"][:, 0] - r["reference"][:, 0], axis=1)
     assert error[r.time > 9.5].max() < 0.15
+
+
+def test_a_drone_whose_sensors_stand_still_is_let_go_before_it_does_harm():
+    fault = [{"kind": "sensor-stuck", "at": 6.0, "drone": 2, "duration": 1e3}]
+    flight = Flight(load_mission("real-world", {"fault": fault, "truth.load_mass_factor": 1.0}))
+    r = flight.run()
+    assert r.outcome == "completed"
+    ((when, drone),) = flight.found
+    assert drone == 2
+    assert 0.06 < when - 6.0 < 0.2
+    error = np.linalg.norm(r["load"][:, 0] - r["reference"][:, 0], axis=1)
+    assert error.max() < 0.15

@@ -209,6 +209,39 @@ def test_thresholds_are_settings():
     assert Residuals().params(colift.team.Team.uniform(3)).size == 11
 
 
+def alarms(distances, dt=0.005):
+    """Whether a drone above its load is judged lost as the distance between them takes these values."""
+    part, team = Residuals(), colift.team.Team.uniform(1)
+    params, memory, carrying = part.params(team), part.memory(team), np.ones(1)
+    down, q = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    found = []
+    for d, speed in zip(distances, np.gradient(distances, dt), strict=True):
+        load = np.array([[0.0, 0.0, -d], [0.0, 0.0, -speed]])
+        hover = np.array([team.masses[0] * team.gravity])
+        Residuals.kernel(
+            dt, load, np.zeros((1, 3)), np.zeros((1, 3)), q, hover, np.zeros(1), down, params,
+            memory, carrying,
+        )  # fmt: skip
+        found.append(carrying[0] == 0.0)
+    return np.array(found)
+
+
+def test_a_cable_that_was_slack_for_long_catches_without_an_alarm():
+    taut, slack = np.full(400, 1.0), np.full(800, 0.97)
+    catching = np.linspace(0.97, 1.0, 12)
+    assert not alarms(np.concatenate([taut, slack, catching, taut])).any()
+    gone = 1.0 + 0.5 * 1.3 * (0.005 * np.arange(40)) ** 2  # pulled away by what it carried
+    lost = alarms(np.concatenate([taut, slack, catching, taut, gone]))
+    assert not lost[:1612].any()
+    assert lost[1612 + 30]
+
+
+def test_a_length_that_nobody_knows_yet_alarms_nobody():
+    """A cable 5 % longer than thought, slack at the start."""
+    falling = np.minimum(1.0 + 0.5 * 1.3 * (0.005 * np.arange(200)) ** 2, 1.05)
+    assert not alarms(falling).any()
+
+
 # ---------------------------------------------------------------- controlled descent
 
 

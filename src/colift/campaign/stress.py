@@ -67,8 +67,22 @@ def condition_names() -> list[str]:
     return [*WEATHER, *FAULTS]
 
 
+def _parts(condition: str) -> tuple[str, str]:
+    """Fault and weather of a condition; no fault is an empty name."""
+    if condition in WEATHER:
+        return "", condition
+    fault, found, weather = condition.partition(" in ")
+    if fault not in FAULTS:
+        raise UnknownNameError("condition", fault, list(FAULTS) if found else condition_names())
+    if found and weather not in WEATHER:
+        raise UnknownNameError("condition", weather, list(WEATHER))
+    return fault, weather or "noise"
+
+
 def world(condition: str, seed: int, n: int) -> Overrides:
-    """What a condition makes of a mission's world; a fault comes with delay and noise.
+    """What a condition makes of a mission's world.
+
+    A fault comes with delay and noise, or with the weather that is named behind it: ``"cable cut in wind"``.
 
     Raises
     ------
@@ -76,16 +90,12 @@ def world(condition: str, seed: int, n: int) -> Overrides:
         If there is no such condition.
 
     """
-    if condition in WEATHER:
-        return {**UNTOUCHED, **WEATHER[condition]}
-    if condition not in FAULTS:
-        raise UnknownNameError("condition", condition, condition_names())
-    fault = {
-        **FAULTS[condition],
-        "at": FAULT_AT,
-        "drone": 0 if condition in WHOLE_TEAM else seed % n,
-    }
-    return {**UNTOUCHED, "sensing": NOISY, "fault": [fault]}
+    fault, weather = _parts(condition)
+    found = {**UNTOUCHED, **WEATHER[weather]}
+    if fault:
+        drone = 0 if fault in WHOLE_TEAM else seed % n
+        found["fault"] = [{**FAULTS[fault], "at": FAULT_AT, "drone": drone}]
+    return found
 
 
 def cases(
@@ -123,7 +133,7 @@ def cases(
 
 def _bound(name: str, bound: Bound | dict[str, float], condition: str) -> dict[str, Any]:
     plain = bound.model_dump(exclude_none=True) if isinstance(bound, Bound) else dict(bound)
-    if name == "lost_drones" and condition in FAULTS and "max" in plain:
+    if name == "lost_drones" and _parts(condition)[0] and "max" in plain:
         plain["max"] = max(plain["max"], 1.0)  # the one that breaks may leave
     return plain
 

@@ -78,15 +78,15 @@ def stress(
 ) -> None:
     """Fly one mission under everything that can go wrong, against its criteria.
 
-    Each condition replaces the mission's world: wind, delay, noise, wrong masses, faults. What fails gets a
-    mission file that flies it again and a replay, both linked in the report. With --out DIR of an
+    Each condition replaces the mission's world: wind, delay, noise, wrong masses, faults. A fault happens in noise
+    and delay, or in the weather named behind it. What fails gets a mission file that flies it again and a replay, both linked in the report. With --out DIR of an
     earlier, perhaps interrupted campaign, only what is missing is flown.
 
     [bold]Examples[/bold]
 
       colift stress
       colift stress my-mission.toml --allocators safe,sqp --plants rigid-cables,slack-cables
-      colift stress --conditions "wind;cable cut" --seeds 20
+      colift stress --conditions "wind;cable cut;cable cut in wind" --seeds 20
     """
     from colift.mission.load import parse_override
 
@@ -121,7 +121,7 @@ def stress(
                 retry_failed=retry_failed, progress=advance,
             ),
         )  # fmt: skip
-    from colift.report.stress import matrix_table, write_stress
+    from colift.report.stress import matrix_tables, write_stress
 
     missions = {job.key: job.mission for _, job in planned}
     found = study.verdicts(outcome.rows, missions)
@@ -155,7 +155,9 @@ def stress(
     if as_json:
         emit(result)
     else:
-        show_tables([(f"{mission}: flights that pass", *matrix_table(found))])
+        show_tables(
+            (f"{mission}, {title}", header, lines) for title, header, lines in matrix_tables(found)
+        )
         out.print(f"{passed} of {len(found)} flights pass.")
         show_end(outcome, files)
     if any(row["status"] == "failed" for row in outcome.rows):

@@ -14,21 +14,30 @@ from colift.recording import atomic_path
 from colift.report import html
 from colift.report.campaign import provenance
 
-Table = tuple[list[str], list[list[str]]]
-"""Header and rows, as text."""
+Table = tuple[str, list[str], list[list[str]]]
+"""Title, header and rows, as text."""
 
 
-def matrix_table(found: Sequence[Verdict]) -> Table:
-    """One line a condition, one column for each allocator and plant."""
+def matrix_tables(found: Sequence[Verdict]) -> list[Table]:
+    """One line a condition, one column an allocator, one table a plant; or a column a plant for one allocator."""
     cells = matrix(found)
     places = list(dict.fromkeys(place for row in cells.values() for place in row))
-    several = len({plant for _, plant in places}) > 1
-    heads = [f"{allocator}, {plant}" if several else allocator for allocator, plant in places]
-    lines = [
-        [condition, *(cell_text(row[place]) for place in places)]
-        for condition, row in cells.items()
+    allocators, plants = (list(dict.fromkeys(names)) for names in zip(*places, strict=True))
+    if len(allocators) == 1:
+        tables = {allocators[0]: {(allocators[0], plant): plant for plant in plants}}
+    else:
+        tables = {plant: {(name, plant): name for name in allocators} for plant in plants}
+    return [
+        (
+            title,
+            ["condition", *columns.values()],
+            [
+                [condition, *(cell_text(row[place]) for place in columns)]
+                for condition, row in cells.items()
+            ],
+        )
+        for title, columns in tables.items()
     ]
-    return ["condition", *heads], lines
 
 
 def cell_text(cell: Cell) -> str:
@@ -56,8 +65,7 @@ def write_stress(
 
     """
     failing = [verdict for verdict in found if not verdict.passed]
-    header, lines = matrix_table(found)
-    cells = [[f"<b>{escape(first)}</b>", *map(_marked, rest)] for first, *rest in lines]
+    tables = matrix_tables(found)
     criteria = {
         f"{name} {bound}" for verdict in found for name, bound in verdict.mission.criteria.items()
     }
@@ -69,11 +77,11 @@ def write_stress(
             "warn" if failing else "good",
             f"{len(found) - len(failing)} of {len(found)} flights pass.",
         ),
-        html.facts([f"{len(lines)} conditions", f"{len(found)} flights", *sorted(criteria)]),
+        html.facts([f"{len(tables[0][2])} conditions", f"{len(found)} flights", *sorted(criteria)]),
         "<h2>Matrix</h2>",
         '<p class="soft">Flights that pass, the largest distance of the load from its reference and the '
         "smallest angle between two cables in any of them.</p>",
-        html.table(header, cells),
+        *(_matrix(*table) for table in tables),
         "<h2>Flights that fail</h2>",
         _failures(failing, folder, replays),
         *provenance(command),
@@ -83,6 +91,11 @@ def write_stress(
         text = html.page(f"{found[0].mission.name} under stress - colift", "\n".join(body))
         temporary.write_text(text, encoding="utf-8", newline="\n")
     return target
+
+
+def _matrix(title: str, header: list[str], lines: list[list[str]]) -> str:
+    cells = [[f"<b>{escape(first)}</b>", *map(_marked, rest)] for first, *rest in lines]
+    return f"<h3>{escape(title)}</h3>" + html.table(header, cells)
 
 
 def _marked(text: str) -> str:
