@@ -265,7 +265,7 @@ class Safe(AllocatorPart):
     """Barrier of all other limits, in squared shares of the load. Approach very small ones in steps."""
     tolerance: Annotated[float, Field(ge=1e-10, le=1e-3)] = 1e-6
     """KKT residual, in shares of the load, at which the iteration stops."""
-    max_iterations: Annotated[int, Field(ge=2, le=200)] = 26
+    max_iterations: Annotated[int, Field(ge=2, le=200)] = 36
     """Most interior-point steps in one call."""
 
     @model_validator(mode="after")
