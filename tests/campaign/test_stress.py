@@ -64,6 +64,13 @@ def test_a_fault_happens_in_the_weather_named_behind_it():
             stress.cases("hover", [wrong], [], [], 1)
 
 
+def test_a_star_is_every_fault():
+    found = stress.expand("wind; * in all, load +50 %;cable cut")
+    assert found[0] == "wind"
+    assert found[-1] == "cable cut"
+    assert found[1:-1] == [f"{fault} in all, load +50 %" for fault in stress.FAULTS]
+
+
 def test_a_condition_replaces_the_whole_world():
     (case,) = stress.cases("real-world", ["calm"], [], [], 1)
     loaded = load_mission(case.mission, case.overrides)

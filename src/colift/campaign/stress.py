@@ -67,6 +67,16 @@ def condition_names() -> list[str]:
     return [*WEATHER, *FAULTS]
 
 
+def expand(text: str) -> list[str]:
+    """Conditions from one text, separated by semicolons; ``* in wind`` is every fault in that weather."""
+    found = []
+    for condition in text.split(";"):
+        fault, _, weather = condition.strip().partition(" in ")
+        every = fault == "*" and weather
+        found += [f"{name} in {weather}" for name in FAULTS] if every else [condition.strip()]
+    return found
+
+
 def _parts(condition: str) -> tuple[str, str]:
     """Fault and weather of a condition; no fault is an empty name."""
     if condition in WEATHER:

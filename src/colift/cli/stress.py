@@ -87,6 +87,7 @@ def stress(
       colift stress
       colift stress my-mission.toml --allocators safe,sqp --plants rigid-cables,slack-cables
       colift stress --conditions "wind;cable cut;cable cut in wind" --seeds 20
+      colift stress --conditions "* in all, load +50 %"
     """
     from colift.mission.load import parse_override
 
@@ -103,9 +104,7 @@ def stress(
         for source in sources:
             source.load()
         changes = dict(parse_override(text) for text in sets or [])
-        chosen = (
-            [c.strip() for c in conditions.split(";")] if conditions else study.condition_names()
-        )
+        chosen = study.expand(conditions) if conditions else study.condition_names()
         planned = plan(
             study.cases(
                 mission, chosen, _several(allocators), _several(plants), seeds, changes
