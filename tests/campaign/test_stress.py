@@ -64,6 +64,14 @@ def test_a_fault_happens_in_the_weather_named_behind_it():
             stress.cases("hover", [wrong], [], [], 1)
 
 
+def test_the_worst_weather_is_the_mission_that_was_made_for_it():
+    """The mission and the condition are written apart, so that either may be changed; knowingly."""
+    own = load_mission("real-world")
+    (case,) = stress.cases("real-world", ["all, load +50 %"], [], [], 1)
+    theirs = load_mission(case.mission, case.overrides)
+    assert theirs.resolved() == own.resolved()
+
+
 def test_a_star_is_every_fault():
     found = stress.expand("wind; * in all, load +50 %;cable cut")
     assert found[0] == "wind"

@@ -171,6 +171,22 @@ def test_an_attitude_is_turned_by_its_torques_while_the_rate_is_not_measured():
     assert ends[1][1] > 4.0 * ends[0][1]  # nobody braked
 
 
+def test_sampling_is_not_taken_for_silence():
+    """What the estimator makes up for between two samples is not made up for twice."""
+    team, torques = Team.uniform(1), []
+    for held in (1, 8):
+        part = DelayAware(delay=0.02)
+        params, memory, tau = part.params(team), part.memory(team), np.zeros((1, 3))
+        for k in range(200):
+            angle = 0.1 * np.sin(0.02 * k)
+            q = np.array([[np.cos(0.5 * angle), np.sin(0.5 * angle), 0.0, 0.0]])
+            Omega = np.array([[1e-9 * (k // held), 0.0, 0.0]])
+            wanted = np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 3))
+            type(part).kernel(q, Omega, *wanted, 1e-3, params, memory, tau)
+        torques.append(tau[0, 0])
+    assert torques[1] == pytest.approx(torques[0], rel=1e-6)
+
+
 def test_a_silent_drone_is_carried_forward_and_then_left_standing():
     part = Predictor(delay=0.0, attitude_delay=0.0, coast=0.1)
     watched = Watched(part, 0)

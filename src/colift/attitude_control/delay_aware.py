@@ -18,9 +18,9 @@ from colift.tuning import Delays
 YAW = 0.25
 """Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
 
-# params: predicted delay, lag; rho and most angular acceleration (3 each); how long silence is made up for; then
-# J and K_d of each drone (3 each)
-_COAST, _HEAD = 8, 9
+# params: predicted delay, lag; rho and most angular acceleration (3 each); how long silence is made up for, and from
+# when on; then J and K_d of each drone (3 each)
+_COAST, _STEADY, _HEAD = 8, 9, 10
 _MOST = 64  # control periods that a predicted delay may last
 # Memory per drone: past torques, newest first; the torque that acts; last measured rate (3 each); time since it changed
 _ACTING, _LAST, _SILENCE = 3 * _MOST, 3 * _MOST + 3, 3 * _MOST + 6
@@ -52,8 +52,8 @@ def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: igno
         for k in range(3):
             silent = silent and Omega[i, k] == memory[o + _LAST + k]
             memory[o + _LAST + k] = Omega[i, k]
-        silence = min(memory[o + _SILENCE] + dt, params[_COAST]) if silent else 0.0
-        memory[o + _SILENCE] = silence
+        memory[o + _SILENCE] = memory[o + _SILENCE] + dt if silent else 0.0
+        silence = min(max(memory[o + _SILENCE] - params[_STEADY], 0.0), params[_COAST])
         # Whole periods of the age of what is measured, and what is left over of one more.
         span = params[0] + silence
         whole = min(int(span / dt + 1e-9), _MOST - 1)
@@ -101,7 +101,8 @@ class DelayAware(AttitudeControlPart, Delays):
     attitude it turns no faster than it can stop. With ``predicted``, attitude and rate are carried
     forward over ``delay`` by Euler's equations and the torques that acted meanwhile (a Smith predictor in
     state space; Manitius and Olbrot 1979, "finite spectrum assignment"), and the motors' lag is inverted.
-    If the measured rate does not change, it is taken to be that much older, up to ``coast``.
+    If the measured rate does not change for longer than ``steady``, it is taken to be that much older, up to
+    ``coast``.
     """
 
     kernel = _delay_aware
@@ -113,6 +114,8 @@ class DelayAware(AttitudeControlPart, Delays):
 
     coast: Annotated[float, Field(ge=0.0, le=1.0)] = 0.1
     """How long the attitude is predicted without a new measurement, s."""
+    steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
+    """Silence that is only the sensor's sampling, which the estimator makes up for, s."""
 
     def params(self, team: Team) -> Vector:
         rate = self.bandwidths().rate
@@ -120,7 +123,7 @@ class DelayAware(AttitudeControlPart, Delays):
         gains = rate * np.array([1.0, 1.0, YAW])
         most = [self.max_acceleration, self.max_acceleration, self.max_yaw_acceleration]
         rows = np.hstack([team.inertias, gains * team.inertias])
-        return np.concatenate([[span, lag], 0.5 * gains, most, [coast], rows.ravel()])
+        return np.concatenate([[span, lag], 0.5 * gains, most, [coast, self.steady], rows.ravel()])
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(_SLOTS * team.n)

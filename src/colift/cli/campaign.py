@@ -18,6 +18,7 @@ from colift.cli.base import err, out
 
 if TYPE_CHECKING:
     from colift.campaign.engine import Outcome, Progress
+    from colift.campaign.plan import Plan
 
 FILE = "campaign.sqlite"
 """Name of the file of results in a command's folder."""
@@ -66,6 +67,30 @@ def flights(title: str) -> Iterator[Callable[[Progress], None]]:
             bar.update(task, completed=now.done, total=now.total, left=left + failed)
 
         yield show
+
+
+def fly(
+    title: str,
+    planned: Plan,
+    folder: Path,
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    retry_failed: bool,
+    recordings: bool = False,
+) -> Outcome:
+    """Fly what the folder does not hold yet, with a bar of flights."""
+    from colift.campaign import engine
+
+    with flights(title) as advance:
+        return engine.run(
+            planned,
+            engine.Options(
+                file=folder / FILE, workers=workers, scheduler=scheduler,
+                retry_failed=retry_failed, progress=advance,
+                recordings=folder / "recordings" if recordings else None,
+            ),
+        )  # fmt: skip
 
 
 def duration(seconds: float) -> str:

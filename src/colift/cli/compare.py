@@ -32,7 +32,7 @@ from colift.cli.campaign import (
     Workers,
     command_line,
     export,
-    flights,
+    fly,
     show_end,
 )
 
@@ -82,7 +82,7 @@ def compare(
 
     with loading():
         from colift.campaign import compare as study
-        from colift.campaign import engine, judge
+        from colift.campaign import judge
         from colift.campaign.plan import Source, plan
 
         sources = [Source.read(path) for path in extra or []]
@@ -96,15 +96,10 @@ def compare(
         )
         planned = plan(study.cases(able, chosen, seeds, changes, spread=spread), sources)
     target = folder or new_folder("compare")
-    with flights("Comparing") as advance:
-        outcome = engine.run(
-            planned,
-            engine.Options(
-                file=target / FILE, workers=workers, scheduler=scheduler,
-                retry_failed=retry_failed, progress=advance,
-                recordings=target / "recordings" if recordings else None,
-            ),
-        )  # fmt: skip
+    outcome = fly(
+        "Comparing", planned, target, workers=workers, scheduler=scheduler,
+        retry_failed=retry_failed, recordings=recordings,
+    )  # fmt: skip
     from colift.report.campaign import contest_table, write_contest
 
     contest = [row for row in outcome.rows if row["study"] == study.CONTEST]

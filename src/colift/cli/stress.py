@@ -32,7 +32,7 @@ from colift.cli.campaign import (
     Workers,
     command_line,
     export,
-    flights,
+    fly,
     show_end,
 )
 
@@ -92,7 +92,6 @@ def stress(
     from colift.mission.load import parse_override
 
     with loading():
-        from colift.campaign import engine
         from colift.campaign import stress as study
         from colift.campaign.plan import Source, plan
 
@@ -112,14 +111,10 @@ def stress(
             sources,
         )  # fmt: skip
     target = folder or new_folder("stress")
-    with flights("Stressing") as advance:
-        outcome = engine.run(
-            planned,
-            engine.Options(
-                file=target / FILE, workers=workers, scheduler=scheduler,
-                retry_failed=retry_failed, progress=advance,
-            ),
-        )  # fmt: skip
+    outcome = fly(
+        "Stressing", planned, target, workers=workers, scheduler=scheduler,
+        retry_failed=retry_failed,
+    )  # fmt: skip
     from colift.report.stress import matrix_tables, write_stress
 
     missions = {job.key: job.mission for _, job in planned}

@@ -29,7 +29,7 @@ from colift.cli.campaign import (
     Workers,
     command_line,
     export,
-    flights,
+    fly,
     show_end,
 )
 
@@ -74,7 +74,6 @@ def sweep(
     from colift.mission.load import parse_override
 
     with loading():
-        from colift.campaign import engine
         from colift.campaign import sweep as study
         from colift.campaign.plan import Source, plan
 
@@ -83,15 +82,10 @@ def sweep(
         changes = dict(parse_override(text) for text in sets or [])
         planned = plan(study.cases(mission, overs, seeds, changes), sources)
     target = folder or new_folder("sweep")
-    with flights(f"Sweeping {mission}") as advance:
-        outcome = engine.run(
-            planned,
-            engine.Options(
-                file=target / FILE, workers=workers, scheduler=scheduler,
-                retry_failed=retry_failed, progress=advance,
-                recordings=target / "recordings" if recordings else None,
-            ),
-        )  # fmt: skip
+    outcome = fly(
+        f"Sweeping {mission}", planned, target, workers=workers, scheduler=scheduler,
+        retry_failed=retry_failed, recordings=recordings,
+    )  # fmt: skip
     from colift.report.campaign import sweep_tables, write_sweep
     from colift.report.campaign_figures import Swept
 

@@ -41,7 +41,7 @@ DOUBT = 0.05
 
 
 @inline
-def _observe(i, n, v, dt, params, memory, o):  # type: ignore[no-untyped-def]
+def _observe(i, v, params, memory, o):  # type: ignore[no-untyped-def]
     """The force that explains the momentum which the known forces do not; bounded, without windup."""
     m = params[_HEAD + i]
     size = 0.0
@@ -115,7 +115,7 @@ def _observe_and_control(  # type: ignore[no-untyped-def]
                 memory[o + _DIRECTION + k] = alpha[i, k]
         reach = params[11] / (params[6] * params[6] * params[_HEAD + n + i])
         follow(memory, o + _DIRECTION, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[6], dt, reach)
-        _observe(i, n, v, dt, params, memory, o)
+        _observe(i, v, params, memory, o)
     wind = _common_wind(n, params, memory)
     for i in range(n):
         o = _SLOTS * i
