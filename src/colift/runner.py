@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from colift import metrics
-from colift.mission.load import load_mission
+from colift.mission.load import layered, load_mission
 from colift.mission.schema import Mission
 from colift.recording import Recording
 from colift.simulation.flight import Flight, Progress
@@ -95,7 +95,6 @@ def run(
     for name, value in settings.items():
         path = name.replace("__", ".") if "__" in name else f"allocation.{name}"
         changes[path] = value
-    changes.update(overrides or {})
-    flight = Flight(load_mission(mission, changes))
+    flight = Flight(load_mission(mission, layered(changes, overrides or {})))
     recording = flight.run(progress)
     return Run(recording=recording, loop_time=flight.loop_time, compiled=flight.compiled)

@@ -17,7 +17,7 @@ import colift
 from colift.campaign import engine, stress
 from colift.campaign.plan import plan
 from colift.campaign.store import Store
-from colift.errors import UnknownNameError
+from colift.errors import ColiftError, UnknownNameError
 from colift.mission import load_mission
 from colift.report.stress import matrix_tables, write_stress
 
@@ -25,7 +25,7 @@ SHORT = {"timing.duration": 7.0}
 
 
 def flown(tmp_path, conditions, **options):
-    given = {"allocators": [], "plants": [], "seeds": 1, "changes": SHORT, **options}
+    given = {"allocators": [], "plants": [], "seeds": [0], "changes": SHORT, **options}
     planned = plan(stress.cases("real-world", conditions, **given))
     outcome = engine.run(planned, engine.Options(tmp_path / "c.sqlite", workers=1))
     return stress.verdicts(outcome.rows, {job.key: job.mission for _, job in planned})
@@ -35,11 +35,7 @@ def flown(tmp_path, conditions, **options):
 def test_every_condition_is_a_valid_world_for_every_seed(condition):
     for seed in (0, 5):
         for mission in ("real-world", "hover"):
-            (case,) = [
-                c
-                for c in stress.cases(mission, [condition], [], [], seed + 1)
-                if c.labels["seed"] == seed
-            ]
+            (case,) = stress.cases(mission, [condition], [], [], [seed])
             loaded = load_mission(case.mission, case.overrides)
             assert loaded.seed == seed
             faults = loaded.fault
@@ -49,11 +45,11 @@ def test_every_condition_is_a_valid_world_for_every_seed(condition):
 
 def test_an_unknown_condition_is_named_with_the_nearest():
     with pytest.raises(UnknownNameError, match="did you mean 'wind'"):
-        stress.cases("hover", ["wimd"], [], [], 1)
+        stress.cases("hover", ["wimd"], [], [], [0])
 
 
 def test_a_fault_happens_in_the_weather_named_behind_it():
-    (case,) = stress.cases("real-world", ["cable cut in all, load +50 %"], [], [], 1)
+    (case,) = stress.cases("real-world", ["cable cut in all, load +50 %"], [], [], [0])
     loaded = load_mission(case.mission, case.overrides)
     assert loaded.truth.load_mass_factor == 1.5
     assert len(loaded.disturbance) == len(stress.WIND)
@@ -61,13 +57,13 @@ def test_a_fault_happens_in_the_weather_named_behind_it():
     assert loaded.criteria["lost_drones"].max == 1.0
     for wrong in ("cable cut in wimd", "cabel cut in wind", "wind in wind", " in wind"):
         with pytest.raises(UnknownNameError):
-            stress.cases("hover", [wrong], [], [], 1)
+            stress.cases("hover", [wrong], [], [], [0])
 
 
 def test_the_worst_weather_is_the_mission_that_was_made_for_it():
     """The mission and the condition are written apart, so that either may be changed; knowingly."""
     own = load_mission("real-world")
-    (case,) = stress.cases("real-world", ["all, load +50 %"], [], [], 1)
+    (case,) = stress.cases("real-world", ["all, load +50 %"], [], [], [0])
     theirs = load_mission(case.mission, case.overrides)
     assert theirs.resolved() == own.resolved()
 
@@ -80,7 +76,7 @@ def test_a_star_is_every_fault():
 
 
 def test_a_condition_replaces_the_whole_world():
-    (case,) = stress.cases("real-world", ["calm"], [], [], 1)
+    (case,) = stress.cases("real-world", ["calm"], [], [], [0])
     loaded = load_mission(case.mission, case.overrides)
     assert loaded.disturbance == []
     assert loaded.truth.load_mass_factor == 1.0
@@ -88,21 +84,35 @@ def test_a_condition_replaces_the_whole_world():
 
 
 def test_criteria_are_the_missions_or_sensible_ones():
-    (own,) = stress.cases("real-world", ["calm"], [], [], 1)
+    (own,) = stress.cases("real-world", ["calm"], [], [], [0])
     assert load_mission(own.mission, own.overrides).criteria["tracking_max_m"].max == 0.1
-    (default,) = stress.cases("hover", ["calm"], [], [], 1)
+    (default,) = stress.cases("hover", ["calm"], [], [], [0])
     assert set(load_mission(default.mission, default.overrides).criteria) == set(
         stress.DEFAULT_CRITERIA
     )
-    (broken,) = stress.cases("real-world", ["cable cut"], [], [], 1)
+    (broken,) = stress.cases("real-world", ["cable cut"], [], [], [0])
     assert load_mission(broken.mission, broken.overrides).criteria["lost_drones"].max == 1.0
-    (other,) = stress.cases("hover", ["calm"], [], [], 1, {"criteria.tracking_max_m.max": 0.02})
+    (other,) = stress.cases("hover", ["calm"], [], [], [0], {"criteria.tracking_max_m.max": 0.02})
     assert load_mission(other.mission, other.overrides).criteria["tracking_max_m"].max == 0.02
+
+
+def test_what_is_set_is_what_is_flown_and_what_the_table_says():
+    """A condition has its own world and kinds; all that is set comes after."""
+    changes = {"actuation.kind": "motors", "plant.kind": "mujoco", "drones.count": 3}
+    for case in stress.cases("real-world", ["calm", "cable cut"], [], [], [4], changes):
+        loaded = case.load()
+        assert loaded.kinds["actuation"] == "motors"
+        assert (loaded.kinds["plant"], case.labels["plant"]) == ("mujoco", "mujoco")
+        assert all(fault.drone == 1 for fault in loaded.fault)  # 4 modulo 3
+    with pytest.raises(ColiftError, match="--plants varies"):
+        stress.cases("real-world", ["calm"], [], ["slack-cables"], [0], changes)
+    with pytest.raises(ColiftError, match="--first-seed"):
+        stress.cases("real-world", ["calm"], [], [], [0], {"seed": 3})
 
 
 def test_the_matrix_counts_every_flight(tmp_path):
     found = flown(
-        tmp_path, ["calm", "wind"], plants=["rigid-cables", "slack-cables"], seeds=2,
+        tmp_path, ["calm", "wind"], plants=["rigid-cables", "slack-cables"], seeds=[0, 1],
         changes={"timing.duration": 2.0},
     )  # fmt: skip
     cells = stress.matrix(found)

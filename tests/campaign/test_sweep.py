@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from colift.campaign.plan import HEADING, OFFSET
 from colift.campaign.sweep import METRICS, Over, cases, parse_over, points
-from colift.errors import MissionError
+from colift.errors import ColiftError, MissionError
 
 
 @pytest.mark.parametrize(
@@ -47,18 +48,35 @@ def test_a_mistake_is_named(text: str, says: str) -> None:
 
 def test_a_sweep_is_the_grid_of_its_values_times_seeds() -> None:
     overs = [parse_over("load.mass=0.1,0.2"), parse_over("allocation.kind=sqp,safe")]
-    found = cases("hover", overs, 3, {"timing.duration": 1.0})
+    found = cases("hover", overs, range(3), {"timing.duration": 1.0})
     assert len(found) == 12
     assert len({tuple(case.labels.items()) for case in found}) == 12
     assert found[0].labels == {"load.mass": 0.1, "allocation.kind": "sqp", "seed": 0}
     assert found[0].overrides == {
-        "seed": 0, "timing.duration": 1.0, "load.mass": 0.1, "allocation.kind": "sqp"
+        "timing.duration": 1.0, "load.mass": 0.1, "allocation.kind": "sqp"
     }  # fmt: skip
-    assert found[-1].overrides["start.heading_deg"] != 0.0
+    first, last = found[0].load(), found[-1].load()
+    assert (first.seed, last.seed) == (0, 2)
+    assert first.start.heading_deg == 0.0 != last.start.heading_deg
+
+
+def test_seeds_start_a_little_off_what_is_swept_and_set() -> None:
+    over = [parse_over("start.heading_deg=20,40")]
+    start = {"start": {"cone_deg": 50.0, "load_offset": [0.5, 0.0, 0.0]}}
+    for case in cases("hover", over, range(1000, 1003), start):
+        loaded = case.load()
+        assert loaded.seed == case.seed == case.labels["seed"] >= 1000
+        off = loaded.start.heading_deg - float(case.labels["start.heading_deg"])
+        assert 0.0 < abs(off) <= HEADING
+        assert 0.0 < abs(loaded.start.load_offset[0] - 0.5) <= OFFSET
+        assert loaded.start.cone_deg == 50.0
+    for overs, changes in (([parse_over("seed=1,2")], {}), (over, {"seed": 3})):
+        with pytest.raises(ColiftError, match="--first-seed"):
+            cases("hover", overs, [0], changes)
 
 
 def test_what_is_swept_wins_over_what_is_set() -> None:
-    (case, _) = cases("hover", [parse_over("load.mass=0.1,0.2")], 1, {"load.mass": 9.0})
+    (case, _) = cases("hover", [parse_over("load.mass=0.1,0.2")], [0], {"load.mass": 9.0})
     assert case.overrides["load.mass"] == 0.1
 
 

@@ -394,7 +394,7 @@ def test_override_values_are_toml_and_else_text(text, expected):
     [
         ({"name.first": "x"}, ["name: is not a table"]),
         ({"load.mass.kg": 1.0}, ["load.mass: is not a table"]),
-        ({"events.1.at": 1.0}, ["events.1: is not a table"]),
+        ({"events.1.at": 1.0}, ["events.1: is not there: the list has 1, from 0"]),
         ({"events.at": 1.0}, ["events.at: events is a list of 1"]),
         ({"": 1}, ["unknown key"]),
         ({"load.": 1}, ["unknown key"]),

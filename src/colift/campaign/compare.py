@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from colift.campaign.plan import HEADING, OFFSET, Case, Source, variation
+from colift.campaign.plan import HEADING, OFFSET, Case, Source, without_seed
 from colift.errors import ColiftError
+from colift.mission.load import layered
 from colift.part import find, names
 
 MISSIONS = ("hover", "paper-spiral", "figure-eight", "point-to-point", "four-to-three")
@@ -44,7 +45,7 @@ def contestants(
 def cases(
     allocators: Sequence[str],
     missions: Sequence[str],
-    seeds: int,
+    seeds: Iterable[int],
     changes: Mapping[str, Any] | None = None,
     *,
     spread: bool = True,
@@ -55,7 +56,7 @@ def cases(
     allocates every :data:`PERIOD`; ``changes`` come last. The spread of those that declare a
     :attr:`~colift.allocation.base.AllocatorPart.spread_setting` is swept on the first mission.
     """
-    changes = dict(changes or {})
+    changes, seeds = without_seed(changes), list(seeds)
     if "allocation.kind" in changes:
         raise ColiftError(
             "allocation.kind is what compare varies; name contestants with --allocators"
@@ -65,18 +66,19 @@ def cases(
         labels = {"study": study, "allocator": name, "mission": mission, "seed": seed, **setting}
         section = {"kind": name, **({setting["setting"]: setting["value"]} if setting else {})}
         given = {"allocation": section, "timing.allocation": PERIOD}
-        return Case(labels, mission, {**given, **variation(mission, seed), **changes})
+        return Case(labels, mission, layered(given, changes), seed)
 
     found = [
         case(CONTEST, name, mission, seed)
-        for seed in range(seeds)
+        for seed in seeds
         for mission in missions
         for name in allocators
     ]
     for name in allocators if spread else ():
         setting, values = find("allocation", name).spread_setting or ("", ())  # type: ignore[attr-defined]
         found += [
-            case(SPREAD, name, missions[0], 0, setting=setting, value=value) for value in values
+            case(SPREAD, name, missions[0], seeds[0], setting=setting, value=value)
+            for value in values
         ]
     return found
 

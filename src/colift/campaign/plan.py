@@ -16,7 +16,7 @@ import numpy as np
 
 import colift
 from colift.errors import ColiftError, MissionError, Problem
-from colift.mission.load import load_mission, read_source
+from colift.mission.load import load_mission
 from colift.mission.schema import Mission
 from colift.part import LAYERS, LISTS, Part, load_file
 
@@ -33,11 +33,27 @@ HEADING, OFFSET = 5.0, 0.02
 
 @dataclass(frozen=True)
 class Case:
-    """One flight that is asked for: how it is called, a mission and what to change in it."""
+    """One flight that is asked for: how it is called, a mission and what to change in it.
+
+    With a ``seed`` it starts a little off, see :func:`varied`.
+    """
 
     labels: Labels
     mission: str | Path
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = None
+
+    def load(self) -> Mission:
+        """The mission to be flown.
+
+        Raises
+        ------
+        MissionError
+            With every mistake in it.
+
+        """
+        mission = load_mission(self.mission, self.overrides)
+        return mission if self.seed is None else varied(mission, self.seed)
 
 
 @dataclass(frozen=True)
@@ -117,7 +133,7 @@ def plan(cases: Sequence[Case], sources: Sequence[Source] = ()) -> Plan:
     found: dict[Problem, list[Labels]] = {}
     for case in cases:
         try:
-            mission = load_mission(case.mission, case.overrides)
+            mission = case.load()
         except MissionError as error:
             for problem in error.problems:
                 found.setdefault(problem, []).append(case.labels)
@@ -170,20 +186,35 @@ def code_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def variation(mission: str | Path, seed: int) -> dict[str, Any]:
-    """Overrides that make a flight of ``mission`` the one of this seed.
+def varied(mission: Mission, seed: int) -> Mission:
+    """The mission with this seed, and started a little off unless the seed is 0.
 
-    Seed 0 is the mission as it is. Any other turns the start formation by up to :data:`HEADING` and moves
-    the load by up to :data:`OFFSET` along each axis, uniformly, so that flights without anything random
-    start a little differently. The mission's own seed is set as well.
+    The start formation is turned by up to :data:`HEADING` and the load moved by up to :data:`OFFSET` along
+    each axis, uniformly, so that flights without anything random differ as well.
     """
     if seed == 0:
-        return {"seed": 0}
+        return mission.model_copy(update={"seed": 0})
     random = np.random.default_rng(seed)
-    start = read_source(mission)[1].get("start", {})
-    offset = np.add(start.get("load_offset", (0.0, 0.0, 0.0)), random.uniform(-OFFSET, OFFSET, 3))
-    heading = start.get("heading_deg", 0.0) + random.uniform(-HEADING, HEADING)
-    return {"seed": seed, "start.load_offset": offset.tolist(), "start.heading_deg": heading}
+    offset = np.add(mission.start.load_offset, random.uniform(-OFFSET, OFFSET, 3))
+    heading = mission.start.heading_deg + random.uniform(-HEADING, HEADING)
+    start = {"load_offset": tuple(offset.tolist()), "heading_deg": heading}
+    return mission.model_copy(
+        update={"seed": seed, "start": mission.start.model_copy(update=start)}
+    )
+
+
+def without_seed(changes: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The changes to every flight of a study, whose seeds are its own to choose.
+
+    Raises
+    ------
+    ColiftError
+        If they change the seed.
+
+    """
+    if "seed" in (changes or {}):
+        raise ColiftError("seed is what a study varies; choose with --seeds and --first-seed")
+    return dict(changes or {})
 
 
 def unique(jobs: Iterable[Job]) -> list[Job]:

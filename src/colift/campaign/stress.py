@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from colift import metrics
-from colift.campaign.plan import Case, Labels
-from colift.errors import UnknownNameError
-from colift.mission.load import load_mission
+from colift.campaign.plan import Case, Labels, without_seed
+from colift.errors import ColiftError, UnknownNameError
+from colift.mission.load import layered, load_mission
 from colift.mission.schema import Bound, Mission
 from colift.survival import FAULTS, WHOLE_TEAM
 
@@ -113,7 +113,7 @@ def cases(
     conditions: Sequence[str],
     allocators: Sequence[str],
     plants: Sequence[str],
-    seeds: int,
+    seeds: Iterable[int],
     changes: Mapping[str, Any] | None = None,
 ) -> list[Case]:
     """Every flight; an empty list of allocators or plants stands for the mission's own.
@@ -121,13 +121,19 @@ def cases(
     The condition replaces the mission's truth, sensing, link, actuation, disturbances and faults; ``changes``
     come last. The allocator that the mission names keeps its settings there.
     """
-    loaded = load_mission(mission)
+    changes = without_seed(changes)
+    for layer, several in (("allocation", allocators), ("plant", plants)):
+        if several and changes.keys() & {layer, f"{layer}.kind"}:
+            option = {"allocation": "--allocators", "plant": "--plants"}[layer]
+            raise ColiftError(f"{layer}.kind is what {option} varies; change fields of it by name")
+    own = {path: value for path, value in changes.items() if path.partition(".")[0] in _MISSIONS}
+    loaded = load_mission(mission, own)
     criteria = loaded.criteria or DEFAULT_CRITERIA
     found = []
-    for seed in range(seeds):
+    for seed in seeds:
         for condition in conditions:
-            own = {**world(condition, seed, loaded.drones.count), "seed": seed}
-            own["criteria"] = {
+            around = world(condition, seed, loaded.drones.count) | {"seed": seed}
+            around["criteria"] = {
                 name: _bound(name, bound, condition) for name, bound in criteria.items()
             }
             for allocator in allocators or [loaded.kinds["allocation"]]:
@@ -136,9 +142,12 @@ def cases(
                     labels: Labels = {
                         "condition": condition, "allocator": allocator, "plant": plant, "seed": seed
                     }  # fmt: skip
-                    given = {**own, **kinds, **(changes or {})}
-                    found.append(Case(labels, mission, given))
+                    found.append(Case(labels, mission, layered(around, kinds, changes)))
     return found
+
+
+_MISSIONS = ("allocation", "plant", "drones")
+"""Sections that a condition leaves alone and that decide which flights there are."""
 
 
 def _bound(name: str, bound: Bound | dict[str, float], condition: str) -> dict[str, Any]:

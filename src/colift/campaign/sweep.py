@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from colift.campaign.plan import Case, Label, variation
+from colift.campaign.plan import Case, Label, without_seed
 from colift.errors import MissionError, Problem
-from colift.mission.load import parse_override
+from colift.mission.load import layered, parse_override
 
 MAX_VALUES = 10_000
 """Most values of one field."""
@@ -87,17 +87,19 @@ def _wrong(text: str, message: str) -> MissionError:
 
 
 def cases(
-    mission: str | Path, overs: Sequence[Over], seeds: int, changes: Mapping[str, Any]
+    mission: str | Path, overs: Sequence[Over], seeds: Iterable[int], changes: Mapping[str, Any]
 ) -> list[Case]:
     """Every combination of values, times seeds; ``changes`` are made in all of them."""
+    changes = without_seed(changes)
+    without_seed({over.path: over.values for over in overs})
     found = []
-    for seed in range(seeds):
+    for seed in seeds:
         choices = [zip(over.values, over.labels, strict=True) for over in overs]
         for choice in itertools.product(*choices):
             values = {over.path: value for over, (value, _) in zip(overs, choice, strict=True)}
             labels = {over.path: label for over, (_, label) in zip(overs, choice, strict=True)}
-            given = {**variation(mission, seed), **changes, **values}
-            found.append(Case({**labels, "seed": seed}, mission, given))
+            labels["seed"] = seed
+            found.append(Case(labels, mission, layered(changes, values), seed))
     return found
 
 

@@ -30,6 +30,13 @@ Seeds = Annotated[
         help="Flights of each case: the first starts as the mission says, others a little off.",
     ),
 ]  # fmt: skip
+FirstSeed = Annotated[
+    int,
+    typer.Option(
+        min=0, max=2**62,
+        help="Seed of the first flight of each case; others follow. Results are worth most with seeds that no tuning saw.",
+    ),
+]  # fmt: skip
 Workers = Annotated[
     int | None,
     typer.Option(min=1, max=1024, help="Processes on this machine.", show_default="one a core"),

@@ -24,6 +24,7 @@ from colift.cli.base import (
 from colift.cli.campaign import (
     FILE,
     Csv,
+    FirstSeed,
     KeepRecordings,
     Parquet,
     RetryFailed,
@@ -48,6 +49,7 @@ def compare(
         typer.Option(metavar="M,N,...", help="Missions.", show_default="five of the shipped"),
     ] = None,
     seeds: Seeds = 3,
+    first_seed: FirstSeed = 0,
     quick: Annotated[
         bool, typer.Option(help="Two missions of 4 s, one seed; a first look.")
     ] = False,
@@ -78,7 +80,7 @@ def compare(
       colift compare --allocators sqp,safe --missions hover,my-mission.toml --seeds 10
       colift compare --with examples/my_allocator.py --quick
     """
-    from colift.mission.load import parse_override
+    from colift.mission.load import parse_overrides
 
     with loading():
         from colift.campaign import compare as study
@@ -88,13 +90,14 @@ def compare(
         sources = [Source.read(path) for path in extra or []]
         own = study.own_allocators(sources)
         able, missing = study.contestants(allocators and allocators.split(","), own)
-        changes = dict(parse_override(text) for text in sets or [])
+        changes = parse_overrides(sets)
         if quick:
             seeds, changes = 1, {"timing.duration": 4.0, **changes}
         chosen = (
             missions.split(",") if missions else study.QUICK_MISSIONS if quick else study.MISSIONS
         )
-        planned = plan(study.cases(able, chosen, seeds, changes, spread=spread), sources)
+        flown_seeds = range(first_seed, first_seed + seeds)
+        planned = plan(study.cases(able, chosen, flown_seeds, changes, spread=spread), sources)
     target = folder or new_folder("compare")
     outcome = fly(
         "Comparing", planned, target, workers=workers, scheduler=scheduler,

@@ -24,7 +24,7 @@ def feasibility(
 
     For a mission with the safe allocator, in hover. Exit code 1 if they cannot.
     """
-    from colift.mission.load import parse_override
+    from colift.mission.load import parse_overrides
 
     with loading():
         import colift
@@ -32,7 +32,7 @@ def feasibility(
         from colift.allocation._feasibility import feasibility as judge
         from colift.allocation.safe import Safe
 
-        loaded = colift.load_mission(mission, dict(parse_override(text) for text in sets or []))
+        loaded = colift.load_mission(mission, parse_overrides(sets))
     if not isinstance(loaded.allocation, Safe):
         raise ColiftError(
             f"{loaded.name}: its allocator {loaded.kinds['allocation']!r} has no limits to judge; "

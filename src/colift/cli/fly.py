@@ -54,7 +54,7 @@ def fly(
       colift fly four-to-three --set allocation.mu=0.3
       colift fly hover --speed 2 --no-open
     """
-    from colift.mission.load import parse_override
+    from colift.mission.load import parse_overrides
 
     with loading():
         from colift.live.run import fly_live
@@ -63,7 +63,7 @@ def fly(
 
         for path in extra or []:
             load_file(path)
-        loaded = load_mission(mission, dict(parse_override(text) for text in sets or []))
+        loaded = load_mission(mission, parse_overrides(sets))
 
     def write(recording: Recording) -> Path:
         from colift.runner import Run

@@ -51,7 +51,7 @@ def run(
       colift run figure-eight --set allocation.mu=0.75 --set timing.duration=60
       colift run my-mission.toml --out results/first --json
     """
-    from colift.mission.load import parse_override
+    from colift.mission.load import parse_overrides
 
     with loading():
         import colift
@@ -60,7 +60,7 @@ def run(
 
         for path in extra or []:
             load_file(path)
-        overrides = dict(parse_override(text) for text in sets or [])
+        overrides = parse_overrides(sets)
         loaded = colift.load_mission(
             mission, {**overrides, **({} if seed is None else {"seed": seed})}
         )

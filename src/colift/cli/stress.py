@@ -26,6 +26,7 @@ from colift.cli.base import (
 from colift.cli.campaign import (
     FILE,
     Csv,
+    FirstSeed,
     Parquet,
     RetryFailed,
     Scheduler,
@@ -58,6 +59,7 @@ def stress(
     seeds: Annotated[
         int, typer.Option(min=1, max=10_000, help="Flights of each case; seed k breaks drone k.")
     ] = 4,
+    first_seed: FirstSeed = 0,
     sets: Sets = None,
     folder: Annotated[
         Path | None,
@@ -89,7 +91,7 @@ def stress(
       colift stress --conditions "wind;cable cut;cable cut in wind" --seeds 20
       colift stress --conditions "* in all, load +50 %"
     """
-    from colift.mission.load import parse_override
+    from colift.mission.load import parse_overrides
 
     with loading():
         from colift.campaign import stress as study
@@ -102,11 +104,12 @@ def stress(
         sources = [Source.read(path) for path in extra or []]
         for source in sources:
             source.load()
-        changes = dict(parse_override(text) for text in sets or [])
+        changes = parse_overrides(sets)
         chosen = study.expand(conditions) if conditions else study.condition_names()
+        flown_seeds = range(first_seed, first_seed + seeds)
         planned = plan(
             study.cases(
-                mission, chosen, _several(allocators), _several(plants), seeds, changes
+                mission, chosen, _several(allocators), _several(plants), flown_seeds, changes
             ),
             sources,
         )  # fmt: skip

@@ -21,6 +21,7 @@ from colift.cli.base import (
 from colift.cli.campaign import (
     FILE,
     Csv,
+    FirstSeed,
     KeepRecordings,
     Parquet,
     RetryFailed,
@@ -48,6 +49,7 @@ def sweep(
         ),
     ],
     seeds: Seeds = 1,
+    first_seed: FirstSeed = 0,
     sets: Sets = None,
     folder: Annotated[
         Path | None,
@@ -71,7 +73,7 @@ def sweep(
       colift sweep paper-spiral --over allocation.mu=0.05:2:40 --seeds 20
       colift sweep hover --over load.mass=0.1:2:20:log --over allocation.kind=sqp,safe
     """  # fmt: skip
-    from colift.mission.load import parse_override
+    from colift.mission.load import parse_overrides
 
     with loading():
         from colift.campaign import sweep as study
@@ -79,8 +81,9 @@ def sweep(
 
         sources = [Source.read(path) for path in extra or []]
         overs = [study.parse_over(text) for text in over]
-        changes = dict(parse_override(text) for text in sets or [])
-        planned = plan(study.cases(mission, overs, seeds, changes), sources)
+        changes = parse_overrides(sets)
+        flown_seeds = range(first_seed, first_seed + seeds)
+        planned = plan(study.cases(mission, overs, flown_seeds, changes), sources)
     target = folder or new_folder("sweep")
     outcome = fly(
         f"Sweeping {mission}", planned, target, workers=workers, scheduler=scheduler,

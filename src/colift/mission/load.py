@@ -7,7 +7,7 @@ import importlib.resources
 import json
 import os.path
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,10 @@ def load_mission(
     source
         Name of a shipped mission, path of a TOML file, or a mapping with the same content.
     overrides
-        Values by dotted path, such as ``{"allocation.mu": 0.75}``; they replace those of the source.
+        Values by dotted path, such as ``{"allocation.mu": 0.75}`` or, for a whole section,
+        ``{"allocation": {"kind": "sqp"}}``. They replace those of the source one after the other, so that
+        the later one wins; another ``kind`` drops the settings of the part that stood there before, but none
+        that was given by its own path.
 
     Raises
     ------
@@ -96,13 +99,14 @@ def load_mission(
         label, table = "mission", _plain(source)
     else:
         label, table = read_source(source)
+        table = _plain(table)
     problems: list[Problem] = []
-    # Kinds first: changing one drops the settings of the part that stood there before.
-    for path in sorted(overrides or {}, key=lambda path: not path.endswith(".kind")):
-        problem = _override(table, path, (overrides or {})[path])
+    given: set[str] = set()
+    for path, value in _plain(overrides or {}).items():
+        problem = _override(table, path, value, given)
         if problem:
             problems.append(problem)
-    mission = _validate(_plain(table), problems)
+    mission = _validate(table, problems)
     if problems or mission is None:
         raise MissionError(label, problems)
     return mission
@@ -121,25 +125,50 @@ def parse_override(text: str) -> tuple[str, Any]:
     return key.strip(), parsed
 
 
-def _override(table: dict[str, Any], path: str, value: Any) -> Problem | None:
+def parse_overrides(texts: Iterable[str] | None) -> dict[str, Any]:
+    """Overrides from texts ``key=value``, of which the later win."""
+    return layered(*(dict([parse_override(text)]) for text in texts or ()))
+
+
+def layered(*changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Overrides one after the other; what is given again comes last, where it wins over all before it."""
+    found: dict[str, Any] = {}
+    for each in changes:
+        for path, value in each.items():
+            found.pop(path, None)
+            found[path] = value
+    return found
+
+
+def _override(table: dict[str, Any], path: str, value: Any, given: set[str]) -> Problem | None:
+    """Set one value; ``given`` are the paths that were set before, brought up to date."""
     *parents, leaf = path.split(".")
     node: Any = table
     for depth, key in enumerate(parents):
-        if isinstance(node, list) and key.isdecimal() and int(key) < len(node):
-            node = node[int(key)]
+        above, where = node, ".".join(parents[: depth + 1])
+        if isinstance(above, list) and key.isdecimal() and int(key) < len(above):
+            node = above[int(key)]
         else:
-            node = node.setdefault(key, {}) if isinstance(node, dict) else None
+            node = above.setdefault(key, {}) if isinstance(above, dict) else None
         if not isinstance(node, dict | list):
-            where = ".".join(parents[: depth + 1])
+            if isinstance(above, list) and key.isdecimal():
+                return Problem(where, "", f"is not there: the list has {len(above)}, from 0")
             return Problem(where, "", "is not a table; cannot set a key in it")
     if not isinstance(node, dict):
         return Problem(
             path, "", f"{'.'.join(parents)} is a list of {len(node)}; name one by its number"
         )
+    section = path.removesuffix(leaf)
     before = node.get("kind", DEFAULT_KINDS.get(parents[-1] if parents else ""))
     if leaf == "kind" and before not in (None, value):
-        node.clear()  # the settings of another part mean nothing to this one
+        own = {
+            known[len(section) :].partition(".")[0] for known in given if known.startswith(section)
+        }
+        for setting in node.keys() - own:
+            del node[setting]  # the settings of another part mean nothing to this one
     node[leaf] = value
+    given.difference_update([known for known in given if known.startswith(f"{path}.")])
+    given.add(path)
     return None
 
 
