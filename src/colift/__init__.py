@@ -6,7 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from colift.allocation.base import Allocation, Allocator, Status
+    from colift.allocation import Status
+    from colift.allocation.base import Allocation, Allocator
     from colift.allocation.safe import SafeAllocator
     from colift.allocation.sqp import SqpAllocator
     from colift.errors import ColiftError, MissionError
@@ -26,7 +27,7 @@ _HOMES = {
     "Run": "colift.runner",
     "SafeAllocator": "colift.allocation.safe",
     "SqpAllocator": "colift.allocation.sqp",
-    "Status": "colift.allocation.base",
+    "Status": "colift.allocation",
     "Team": "colift.team",
     "load_mission": "colift.mission",
     "run": "colift.runner",

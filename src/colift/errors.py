@@ -61,3 +61,12 @@ class BrowserError(ColiftError):
 
 class RecordingError(ColiftError):
     """A file is not a colift recording, or a whole one."""
+
+
+class AbsentSignalError(RecordingError, KeyError):
+    """A recording lacks a signal: it was not recorded, or came after the recording."""
+
+    def __init__(self, name: str, present: Sequence[str]) -> None:
+        super().__init__(f"no signal {name!r}; there are {', '.join(present)}")
+
+    __str__ = Exception.__str__

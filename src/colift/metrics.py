@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.allocation.base import Status
+from colift.allocation import Status
+from colift.errors import AbsentSignalError
 from colift.geometry import pairwise_angles
 from colift.mission.schema import Bound
 from colift.recording import Recording
@@ -51,7 +52,14 @@ def all_metrics() -> tuple[Metric, ...]:
 
 def compute(recording: Recording) -> dict[str, float]:
     """All metrics of a recording by name; NaN where one does not apply."""
-    return {metric.name: float(metric.compute(recording)) for metric in _METRICS}
+    return {metric.name: _value(metric, recording) for metric in _METRICS}
+
+
+def _value(metric: Metric, recording: Recording) -> float:
+    try:
+        return float(metric.compute(recording))
+    except AbsentSignalError:  # the recording is older than the signal
+        return math.nan
 
 
 def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str]:

@@ -10,6 +10,10 @@ Layout of the HDF5 file (format version 1)::
     /allocator/<name>     (cycles,) attributes as above
 
 What was not measured is NaN. Files written before ``source`` and ``provenance`` came are simulations.
+
+A recording outlives the code: a signal that the file lacks is absent, one that this version does not know is
+kept with its legend, and the mission is read without looking up any part (`mission.recorded`). Opening a file
+imports no kernel.
 """
 
 from __future__ import annotations
@@ -20,21 +24,29 @@ import platform
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.errors import MissionError, RecordingError
-from colift.mission.load import load_mission
-from colift.mission.schema import Mission, RealFlight
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
+from colift.errors import AbsentSignalError, RecordingError
+from colift.mission.recorded import RecordedMission
+from colift.simulation.signals import CYCLE_SIGNALS, LEGEND, SIGNALS, Signal
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
+    from colift.mission.schema import RealFlight
 
 Array = NDArray[np.float64]
 FORMAT = "colift recording 1"
+RECORDING = "recording.h5"
+"""Name of the recording in the result folder of a run."""
+_FORMATS = "colift recording "
+_CYCLE = "allocator_"
+"""How the names of signals of one value an allocation begin, beside others."""
 
 
 @contextmanager
@@ -50,8 +62,10 @@ def atomic_path(path: Path) -> Iterator[Path]:
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         os.replace(temporary, path)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno and error.filename is None:
+            error.filename = str(path)  # a write does not say it, as on a full disk
         raise
 
 
@@ -73,8 +87,9 @@ class Recording(Mapping[str, Array]):
 
     Attributes
     ----------
-    mission : Mission or RealFlight
-        As flown, with every default filled in; of a real flight, what is known of it.
+    mission : Mission, RealFlight or RecordedMission
+        As flown, with every default filled in; of a real flight, what is known of it; of a file, what is
+        written there.
     time : (rows,) array
         Times of the signals, s; increasing, in a real flight not evenly.
     cycle_time : (cycles,) array
@@ -85,10 +100,12 @@ class Recording(Mapping[str, Array]):
         Where the data of a real flight come from, and what was inferred; empty for a simulation.
     commands : list of (time, text)
         What a person did while it flew, s.
+    foreign : dict
+        Legend of the signals that this version of colift does not know, by name.
 
     """
 
-    mission: Mission | RealFlight
+    mission: Mission | RealFlight | RecordedMission
     time: Array
     cycle_time: Array
     arrays: dict[str, Array]
@@ -96,12 +113,13 @@ class Recording(Mapping[str, Array]):
     versions: dict[str, str] = field(default_factory=versions)
     provenance: dict[str, Any] = field(default_factory=dict)
     commands: Sequence[tuple[float, str]] = ()
+    foreign: Mapping[str, Signal] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         try:
             return self.arrays[name]
         except KeyError:
-            raise KeyError(f"no signal {name!r}; there are {', '.join(self.arrays)}") from None
+            raise AbsentSignalError(name, list(self.arrays)) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.arrays)
@@ -117,23 +135,48 @@ class Recording(Mapping[str, Array]):
     @property
     def source(self) -> str:
         """``"simulation"``, or ``"flight"`` for one that was flown in the real world."""
-        return "flight" if isinstance(self.mission, RealFlight) else "simulation"
+        return self.mission.source
 
     def measured(self, *names: str) -> bool:
-        """Whether each of these signals has any number in it."""
-        return not any(np.isnan(self[name]).all() for name in names)
+        """Whether each of these signals is there and has any number in it."""
+        return all(name in self and not np.isnan(self[name]).all() for name in names)
 
-    @staticmethod
-    def signal(name: str) -> Signal:
+    def complete(self) -> Recording:
+        """A copy that has every signal that this version knows; what is absent is NaN."""
+        rows, cycles = len(self.time), len(self.cycle_time)
+        unknown = {s.name: (rows, *s.shape_for(self.n)) for s in SIGNALS}
+        unknown |= {s.name: (cycles,) for s in CYCLE_SIGNALS}
+        absent = {
+            name: np.broadcast_to(np.nan, shape)
+            for name, shape in unknown.items()
+            if name not in self
+        }
+        return replace(self, arrays={**self.arrays, **absent}) if absent else self
+
+    def signal(self, name: str) -> Signal:
         """Unit, shape, frame and meaning of a signal."""
-        return next(s for s in (*SIGNALS, *CYCLE_SIGNALS) if s.name == name)
+        return self.foreign[name] if name in self.foreign else LEGEND[name]
 
     def save(self, path: str | Path) -> Path:
-        """Write one HDF5 file, atomically; an existing file is replaced only by a whole one."""
+        """Write one HDF5 file, atomically; an existing file is replaced only by a whole one.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written, as on a full disk; with the path.
+
+        """
+        path = Path(path)
+        with atomic_path(path) as temporary:
+            # HDF5 does not survive a disk that fills up while it writes, so it writes into memory.
+            temporary.write_bytes(self._image())
+        return path
+
+    def _image(self) -> bytes:
+        """The file, byte by byte."""
         import h5py
 
-        path = Path(path)
-        with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        with h5py.File("recording", "w", driver="core", backing_store=False) as file:
             file.attrs["format"] = FORMAT
             file.attrs["mission"] = json.dumps(self.mission.resolved())
             file.attrs["seed"] = self.mission.seed
@@ -147,52 +190,46 @@ class Recording(Mapping[str, Array]):
                 file, "allocator/time", self.cycle_time,
                 Signal("time", (), "s", "t", "-", "time of each allocation"),
             )  # fmt: skip
-            for signal in SIGNALS:
-                _write(file, f"signals/{signal.name}", self[signal.name], signal)
-            for signal in CYCLE_SIGNALS:
-                short = signal.name.removeprefix("allocator_")
-                target = "solve_time" if short == "time" else short
-                _write(file, f"allocator/{target}", self[signal.name], signal)
-        return path
+            for name, values in self.arrays.items():
+                signal = self.signal(name)
+                _write(file, _place(signal), values, signal)
+            file.flush()
+            return bytes(file.id.get_file_image())
 
     @classmethod
     def load(cls, path: str | Path) -> Recording:
-        """Read a recording.
+        """Read a recording, also one of another version of colift, or of parts that are not installed.
+
+        ``path`` is the file, or the result folder of a run.
 
         Raises
         ------
         RecordingError
-            If the file is missing, no HDF5 file, no colift recording, or lacks a signal.
+            If the file is missing or damaged, no HDF5 file or no colift recording.
 
         """
         import h5py
 
+        path = Path(path)
+        if path.is_dir():
+            path /= RECORDING
+        if not path.exists():
+            raise RecordingError(f"{path}: there is no such file")
         try:
             with h5py.File(path, "r") as file:
-                if file.attrs.get("format") != FORMAT:
+                if not str(file.attrs.get("format", "")).startswith(_FORMATS):
                     raise RecordingError(f"{path}: not a file of format {FORMAT!r}")
-                arrays = {s.name: file[f"signals/{s.name}"][()] for s in SIGNALS}
-                for signal in CYCLE_SIGNALS:
-                    short = signal.name.removeprefix("allocator_")
-                    target = "solve_time" if short == "time" else short
-                    arrays[signal.name] = file[f"allocator/{target}"][()]
-                known = dict(json.loads(file.attrs["mission"]))
-                real = file.attrs.get("source") == "flight"
-                return cls(
-                    mission=RealFlight.model_validate(known) if real else load_mission(known),
-                    time=file["time"][()],
-                    cycle_time=file["allocator/time"][()],
-                    arrays=arrays,
-                    outcome=str(file.attrs["outcome"]),
-                    versions=json.loads(file.attrs["versions"]),
-                    provenance=json.loads(file.attrs.get("provenance", "{}")),
-                    commands=[
-                        (float(time), str(text))
-                        for time, text in json.loads(file.attrs.get("commands", "[]"))
-                    ],
-                )
-        except (OSError, KeyError, ValueError, TypeError, MissionError) as error:
+                return _read(file)
+        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise RecordingError(f"{path}: cannot be read as a recording: {error}") from error
+
+
+def _place(signal: Signal) -> str:
+    """Where a signal stands in the file."""
+    if signal.each == "row":
+        return f"signals/{signal.name}"
+    short = signal.name.removeprefix(_CYCLE)
+    return f"allocator/{'solve_time' if short == 'time' else short}"
 
 
 def _write(file: Any, name: str, values: Array, signal: Signal) -> None:
@@ -202,3 +239,70 @@ def _write(file: Any, name: str, values: Array, signal: Signal) -> None:
     dataset.attrs["frame"] = signal.frame
     dataset.attrs["meaning"] = signal.meaning
     dataset.attrs["shape"] = json.dumps(["time", *signal.shape])
+
+
+def _read(file: Any) -> Recording:
+    time = np.asarray(file["time"][()], dtype=float)
+    if time.ndim != 1 or not len(time):
+        raise ValueError("it holds no times")
+    cycles = file.get("allocator", {})
+    cycle_time = np.asarray(cycles["time"][()], dtype=float) if "time" in cycles else np.zeros(0)
+    found = {name: (file["signals"][name], "row") for name in file["signals"]}
+    for short in cycles:
+        name = _CYCLE + ("time" if short == "solve_time" else short)
+        if short != "time":
+            found[name] = (cycles[short], "allocation")
+    arrays, legend = {}, {}
+    for name, (dataset, each) in found.items():
+        if name in LEGEND:
+            arrays[name] = np.asarray(dataset[()], dtype=float)
+        elif hasattr(dataset, "shape"):  # a dataset, and no group
+            arrays[name], legend[name] = dataset[()], _legend(name, dataset, each)
+    table = json.loads(file.attrs["mission"])
+    if not isinstance(table, dict):
+        raise ValueError("its mission is no table")
+    drones = _count(arrays, table)
+    for name in arrays.keys() - legend.keys():
+        rows = len(time) if LEGEND[name].each == "row" else len(cycle_time)
+        shape, expected = arrays[name].shape, (rows, *LEGEND[name].shape_for(drones))
+        if shape != expected:
+            raise ValueError(f"signal {name} has the shape {shape}, not {expected}")
+    return Recording(
+        mission=RecordedMission.read(
+            table, drones=drones, source=str(file.attrs.get("source", "simulation"))
+        ),
+        time=time,
+        cycle_time=cycle_time,
+        arrays=arrays,
+        outcome=str(file.attrs["outcome"]),
+        versions=json.loads(file.attrs.get("versions", "{}")),
+        provenance=json.loads(file.attrs.get("provenance", "{}")),
+        commands=[
+            (float(time), str(text)) for time, text in json.loads(file.attrs.get("commands", "[]"))
+        ],
+        foreign=legend,
+    )
+
+
+def _count(arrays: Mapping[str, Array], table: Mapping[str, Any]) -> int:
+    """Number of drones: that of the signals, which must agree; that of the mission where none tells it."""
+    told = {
+        values.shape[1]
+        for name, values in arrays.items()
+        if name in LEGEND and LEGEND[name].shape[:1] == ("n",) and values.ndim > 1
+    }
+    if len(told) > 1:
+        raise ValueError(f"its signals are of {' and of '.join(map(str, sorted(told)))} drones")
+    return told.pop() if told else int(table["drones"]["count"])
+
+
+def _legend(name: str, dataset: Any, each: str) -> Signal:
+    """What the file says of a signal that this version does not know."""
+    unit, symbol, frame, meaning = (
+        str(dataset.attrs.get(key, "?")) for key in ("unit", "symbol", "frame", "meaning")
+    )
+    try:
+        shape = tuple(json.loads(dataset.attrs["shape"]))[1:]
+    except (KeyError, ValueError, TypeError):
+        shape = tuple(dataset.shape[1:])
+    return Signal(name, shape, unit, symbol, frame, meaning, each=each)

@@ -10,7 +10,8 @@ from typing import Any
 
 from colift import metrics
 from colift.mission.load import layered, load_mission
-from colift.mission.schema import Mission
+from colift.mission.mission import Mission
+from colift.mission.recorded import RecordedMission
 from colift.recording import Recording
 from colift.simulation.flight import Flight, Progress
 
@@ -48,7 +49,7 @@ class Run:
 
 
 def run(
-    mission: str | Path | Mapping[str, Any] | Mission = "paper-spiral",
+    mission: str | Path | Mapping[str, Any] | Mission | RecordedMission = "paper-spiral",
     *,
     allocator: str | None = None,
     seed: int | None = None,
@@ -62,7 +63,7 @@ def run(
     ----------
     mission
         Name of a shipped mission, path of a TOML file, a mapping with the same content, or a loaded
-        mission.
+        mission, also that of a recording.
     allocator
         Name of the allocator to use instead of the mission's.
     seed
@@ -85,7 +86,7 @@ def run(
         With every mistake found in the mission or the overrides; nothing has been flown then.
 
     """
-    if isinstance(mission, Mission):
+    if isinstance(mission, Mission | RecordedMission):
         mission = mission.resolved()
     changes: dict[str, Any] = {}
     if allocator is not None:

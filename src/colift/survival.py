@@ -11,7 +11,7 @@ import numpy as np
 from colift import metrics
 from colift.allocation._feasibility import spread_formation
 from colift.mission.load import load_mission
-from colift.mission.schema import Mission
+from colift.mission.mission import Mission
 from colift.recording import Recording
 from colift.simulation.flight import Flight
 

@@ -5,7 +5,6 @@ An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i 
 
 from __future__ import annotations
 
-import enum
 import operator
 from time import perf_counter
 from typing import Any, ClassVar
@@ -13,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from colift.allocation._status import Status as Status
 from colift.geometry import ring
 from colift.jit import f8, i8, matrix, vector
 from colift.part import Part
@@ -37,36 +37,6 @@ On entry ``tensions`` and ``directions`` hold the last answer, or the start form
 
 INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
 INFO_SIZE = 6
-
-
-class Status(enum.IntEnum):
-    """How an allocation ended. Only ``CONVERGED`` is ``ok``; every other is usable all the same."""
-
-    CONVERGED = 0
-    """The answer meets the allocator's own tolerance."""
-    ITERATION_LIMIT = 1
-    """Force balance and bounds hold; optimality was not reached within the iteration cap."""
-    ZERO_FORCE = 2
-    """The force is (almost) zero: no tension, directions kept."""
-    INVALID_FORCE = 3
-    """The force is not finite (or its square is not): the last allocation is repeated."""
-    NUMERICAL_FAILURE = 4
-    """The iteration left the numbers: the last directions with a share that balances the force."""
-    CLAMPED = 5
-    """A tension came out negative and was set to zero: the force is not fully balanced."""
-    FORCE_REDUCED = 6
-    """The limits do not allow the whole force: the nearest allowed one, horizontal part given up first."""
-    RECOVERING = 7
-    """The start broke a limit: the cables are on their way back, none worse than it was."""
-    PUSHING = 8
-    """A tension came out negative and is shown on the opposite side: a drone below the load."""
-    SILENT = 9
-    """The allocator was not heard: the drones hold what they have. Of the loop, not of an allocator."""
-
-    @property
-    def ok(self) -> bool:
-        """Whether the answer is what the allocator promises."""
-        return self is Status.CONVERGED
 
 
 class AllocatorPart(Part):

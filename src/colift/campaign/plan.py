@@ -17,7 +17,7 @@ import numpy as np
 import colift
 from colift.errors import ColiftError, MissionError, Problem
 from colift.mission.load import load_mission
-from colift.mission.schema import Mission
+from colift.mission.mission import Mission
 from colift.part import LAYERS, LISTS, Part, load_file
 
 Label = str | int | float

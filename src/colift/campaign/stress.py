@@ -11,7 +11,8 @@ from colift import metrics
 from colift.campaign.plan import Case, Labels, without_seed
 from colift.errors import ColiftError, UnknownNameError
 from colift.mission.load import layered, load_mission
-from colift.mission.schema import Bound, Mission
+from colift.mission.mission import Mission
+from colift.mission.schema import Bound
 from colift.survival import FAULTS, WHOLE_TEAM
 
 Overrides = dict[str, Any]

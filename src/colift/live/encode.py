@@ -12,7 +12,7 @@ import numpy as np
 from colift.live import protocol
 from colift.live.session import Row, Session
 from colift.metrics import SAFE_ANGLE
-from colift.recording import Recording
+from colift.simulation.signals import LEGEND
 
 PER_DRONE = {
     "positions", "attitudes", "directions", "desired_directions",
@@ -74,7 +74,7 @@ def rows(found: Sequence[Row], seq: int) -> str:
 
 def _legend() -> dict[str, dict[str, str]]:
     names = ("load", "reference", "force", "external", *sorted(PER_DRONE), "solve_time", "status")
-    found = {name: Recording.signal(_LEGEND_OF.get(name, name)) for name in names}
+    found = {name: LEGEND[_LEGEND_OF.get(name, name)] for name in names}
     legend = {name: {"unit": s.unit, "meaning": s.meaning} for name, s in found.items()}
     for name, meaning in (("load", "load position"), ("reference", "wanted load position")):
         legend[name] = {"unit": "m", "meaning": meaning}

@@ -9,7 +9,8 @@ import numpy as np
 from colift.errors import ColiftError
 from colift.mission.checks import MAX_RECORDING, recorded_bytes
 from colift.mission.load import load_mission
-from colift.mission.schema import Mission, Timing
+from colift.mission.mission import Mission
+from colift.mission.schema import Timing
 from colift.part import names
 from colift.simulation.flight import Flight
 from colift.simulation.loop import MAX_DISTURBANCES

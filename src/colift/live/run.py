@@ -11,7 +11,7 @@ from colift.errors import ColiftError
 from colift.live.pilot import Pilot
 from colift.live.server import Server
 from colift.live.session import Session
-from colift.mission.schema import Mission
+from colift.mission.mission import Mission
 from colift.recording import Recording
 
 

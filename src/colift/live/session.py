@@ -26,7 +26,7 @@ from colift.live import knobs
 from colift.live.endless import flown_mission, live_mission
 from colift.live.watch import Watch, event
 from colift.mission.load import load_mission
-from colift.mission.schema import Mission
+from colift.mission.mission import Mission
 from colift.part import kind_of
 from colift.recording import Recording
 from colift.reference.base import ReferencePart

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from colift.allocation.base import Status
+from colift.allocation import Status
 from colift.geometry import pairwise_angles
 from colift.metrics import SAFE_ANGLE
 from colift.simulation.flight import Flight

@@ -1,6 +1,27 @@
 """Missions as data: the schema, loading with complete validation, overrides."""
 
-from colift.mission.load import load_mission, mission_names
-from colift.mission.schema import Mission
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from colift.mission.load import load_mission, mission_names
+    from colift.mission.mission import Mission
+
+# Resolved on first use: a mission imports its parts' kernels, and what a recording says of one needs none.
+_HOMES = {
+    "Mission": "colift.mission.mission",
+    "load_mission": "colift.mission.load",
+    "mission_names": "colift.mission.load",
+}
 
 __all__ = ["Mission", "load_mission", "mission_names"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'colift.mission' has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value

@@ -15,7 +15,8 @@ from pydantic import ValidationError
 
 from colift.errors import MissionError, Problem, UnknownNameError
 from colift.mission.checks import cross_checks
-from colift.mission.schema import Frame, Mission
+from colift.mission.mission import Mission
+from colift.mission.schema import Frame
 from colift.mission.wording import parse, problems_of, shown
 from colift.part import LAYERS, LISTS, Part, find, names
 

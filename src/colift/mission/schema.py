@@ -9,23 +9,10 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, SerializeAsAny, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from colift.actuation.base import ActuationPart
-from colift.allocation.base import AllocatorPart
-from colift.attitude_control.base import AttitudeControlPart
-from colift.detection.base import DetectionPart
-from colift.disturbance.base import DisturbancePart
-from colift.estimation.base import EstimationPart
-from colift.fault.base import FaultPart
 from colift.geometry import ring
-from colift.link.base import LinkPart
-from colift.load_control.base import LoadControlPart
-from colift.part import LAYERS, LISTS, Vector
-from colift.plant.base import PlantPart
-from colift.position_control.base import PositionControlPart
-from colift.reference.base import ReferencePart
-from colift.sensing.base import SensingPart
+from colift.part import LAYERS, Vector
 from colift.team import Team
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -312,43 +299,8 @@ class RealFlight(Frame):
 
     kinds: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """No part of ours flew it."""
+    source: ClassVar[str] = "flight"
 
     def resolved(self) -> dict[str, Any]:
         """All that is known, as plain data."""
         return self.model_dump(mode="json", exclude_none=True)
-
-
-class Mission(Frame):
-    """A complete flight. Each layer's section names a part with ``kind`` and gives its settings."""
-
-    kinds: dict[str, str]
-    """Name of the part in each layer."""
-    list_kinds: dict[str, list[str]]
-    """Names of the disturbances and faults, in their order."""
-    reference: SerializeAsAny[ReferencePart]
-    sensing: SerializeAsAny[SensingPart]
-    estimation: SerializeAsAny[EstimationPart]
-    load_control: SerializeAsAny[LoadControlPart]
-    allocation: SerializeAsAny[AllocatorPart]
-    link: SerializeAsAny[LinkPart]
-    position_control: SerializeAsAny[PositionControlPart]
-    attitude_control: SerializeAsAny[AttitudeControlPart]
-    actuation: SerializeAsAny[ActuationPart]
-    detection: SerializeAsAny[DetectionPart]
-    plant: SerializeAsAny[PlantPart]
-    disturbance: list[SerializeAsAny[DisturbancePart]] = []
-    """Disturbances, all at once."""
-    fault: list[SerializeAsAny[FaultPart]] = []
-    """Faults to come."""
-
-    def resolved(self) -> dict[str, Any]:
-        """The whole mission with every default filled in, as plain data (a valid mission file)."""
-        data = self.model_dump(mode="json", exclude={"kinds", "list_kinds"}, exclude_none=True)
-        for layer, kind in self.kinds.items():
-            data[layer] = {"kind": kind, **data[layer]}
-        for name in LISTS:
-            data[name] = [
-                {"kind": kind, **settings}
-                for kind, settings in zip(self.list_kinds[name], data[name], strict=True)
-            ]
-        return data

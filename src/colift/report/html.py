@@ -161,7 +161,7 @@ def write_report(
     from colift.report.figures import drawable
     from colift.report.render import draw
 
-    recording = source if isinstance(source, Recording) else source.recording
+    recording = (source if isinstance(source, Recording) else source.recording).complete()
     folder = Path(folder)
     drawings = draw(drawable(recording), recording)
     for drawing in drawings:
@@ -213,9 +213,9 @@ def _flown_by(recording: Recording) -> list[str]:
     mission = recording.mission
     if recording.source == "flight":
         return ["real flight", f"{len(recording.time)} rows"]
+    named = (("reference", "reference"), ("allocator", "allocation"))
     return [
-        f"reference {mission.kinds['reference']}",
-        f"allocator {mission.kinds['allocation']}",
+        *(f"{word} {mission.kinds[kind]}" for word, kind in named if kind in mission.kinds),
         f"seed {mission.seed}",
     ]
 

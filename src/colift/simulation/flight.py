@@ -17,7 +17,8 @@ from colift.disturbance.base import DisturbancePart
 from colift.errors import ColiftError
 from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
-from colift.mission.schema import Event, Mission
+from colift.mission.mission import Mission
+from colift.mission.schema import Event
 from colift.part import LAYERS, Part, Vector, make
 from colift.plant.base import Start
 from colift.recording import Recording

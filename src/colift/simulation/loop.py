@@ -33,7 +33,7 @@ from colift.plant import base as plant
 from colift.position_control import base as position_control
 from colift.reference import base as reference
 from colift.sensing import base as sensing
-from colift.simulation.signals import BUS_TYPE, CYCLE_SIGNALS
+from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus
 
 Array = NDArray[np.float64]
 
@@ -115,6 +115,9 @@ class Disturbances(NamedTuple):
 
 VECTORS_TYPE = types.NamedUniTuple(vector, len(Vectors._fields), Vectors)
 KEYS_TYPE = types.NamedUniTuple(i8, len(Keys._fields), Keys)
+BUS_TYPE = types.NamedTuple(
+    [vector] + [vector if len(signal.shape) == 1 else matrix for signal in SIGNALS], Bus
+)
 PERIODS_TYPE = types.NamedTuple([f8] + [i8] * 5, Periods)
 CYCLE_WIDTH = len(CYCLE_SIGNALS)
 _SILENT = int(Status.SILENT)

@@ -6,14 +6,11 @@ the row to the log records all of them at once, and this table is the legend of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
-
-from colift.jit import matrix, vector
 
 Array = NDArray[np.float64]
 
@@ -30,6 +27,8 @@ class Signal:
     meaning: str
     initial: float = 0.0
     """Value until the first writer."""
+    each: str = "row"
+    """Recorded in each ``"row"`` of the log, or for each ``"allocation"``."""
 
     def shape_for(self, n: int) -> tuple[int, ...]:
         """Shape with the number of drones filled in."""
@@ -83,24 +82,23 @@ SIGNALS = (
 CONDITIONS = ("attached", "motor_health", "stuck", "allocator_up")
 """Signals that say what still works; faults change them."""
 
-CYCLE_SIGNALS = (
-    Signal("allocator_status", (), "1", "-", "-", "status code of each allocation"),
-    Signal("allocator_iterations", (), "1", "-", "-", "iterations of each allocation"),
-    Signal("allocator_kkt_residual", (), "1", "-", "-", "optimality residual of each allocation"),
-    Signal("allocator_objective", (), "N^2", "J", "-", "objective of each allocation"),
-    Signal("allocator_optimality_gap", (), "N^2", "-", "-", "objective less the global optimum"),
-    Signal("allocator_force_residual", (), "N", "-", "-", "error of the force balance"),
-    Signal(
-        "allocator_active_limits",
-        (),
-        "1",
-        "-",
-        "-",
-        "bits of the limits at work; 0 without limits",
-    ),
-    Signal("allocator_time", (), "s", "-", "-", "measured duration of each allocation"),
-)
+CYCLE_SIGNALS = tuple(
+    replace(signal, each="allocation")
+    for signal in (
+        Signal("allocator_status", (), "1", "-", "-", "status code of each allocation"),
+        Signal("allocator_iterations", (), "1", "-", "-", "iterations of each allocation"),
+        Signal("allocator_kkt_residual", (), "1", "-", "-", "optimality residual of each allocation"),
+        Signal("allocator_objective", (), "N^2", "J", "-", "objective of each allocation"),
+        Signal("allocator_optimality_gap", (), "N^2", "-", "-", "objective less the global optimum"),
+        Signal("allocator_force_residual", (), "N", "-", "-", "error of the force balance"),
+        Signal("allocator_active_limits", (), "1", "-", "-", "bits of the limits at work; 0 without limits"),
+        Signal("allocator_time", (), "s", "-", "-", "measured duration of each allocation"),
+    )
+)  # fmt: skip
 """Recorded once per allocation, in this order."""
+
+LEGEND = {signal.name: signal for signal in (*SIGNALS, *CYCLE_SIGNALS)}
+"""All of them by name."""
 
 
 class Bus(NamedTuple):
@@ -146,12 +144,6 @@ class Bus(NamedTuple):
     motor_health: Array
     stuck: Array
     allocator_up: Array
-
-
-BUS_TYPE = types.NamedTuple(
-    [vector] + [vector if len(signal.shape) == 1 else matrix for signal in SIGNALS], Bus
-)
-"""Numba type of :class:`Bus`."""
 
 
 def columns(n: int) -> dict[str, slice]:

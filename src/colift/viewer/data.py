@@ -62,7 +62,7 @@ def payload(
     return {
         "format": 1,
         "flights": [
-            _flight(recording, numbers, label, share)
+            _flight(recording.complete(), numbers, label, share)
             for recording, numbers, label in zip(recordings, metrics, labels, strict=True)
         ],
     }
@@ -100,7 +100,7 @@ def _flight(
         "legend": {
             name: {"unit": signal.unit, "meaning": signal.meaning}
             for name in recording
-            for signal in [Recording.signal(name)]
+            for signal in [recording.signal(name)]
         },
         "metrics": [
             {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.allocation.base import Status
+from colift.allocation import Status
 from colift.geometry import pairwise_angles
 from colift.metrics import SAFE_ANGLE
 from colift.mission.schema import Event

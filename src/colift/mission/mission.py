@@ -1,0 +1,60 @@
+"""A mission with its parts, which are imported for it: their kernels are compiled, or loaded, then."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import Field, SerializeAsAny
+
+from colift.actuation.base import ActuationPart
+from colift.allocation.base import AllocatorPart
+from colift.attitude_control.base import AttitudeControlPart
+from colift.detection.base import DetectionPart
+from colift.disturbance.base import DisturbancePart
+from colift.estimation.base import EstimationPart
+from colift.fault.base import FaultPart
+from colift.link.base import LinkPart
+from colift.load_control.base import LoadControlPart
+from colift.mission.schema import Frame
+from colift.part import LISTS
+from colift.plant.base import PlantPart
+from colift.position_control.base import PositionControlPart
+from colift.reference.base import ReferencePart
+from colift.sensing.base import SensingPart
+
+
+class Mission(Frame):
+    """A complete flight. Each layer's section names a part with ``kind`` and gives its settings."""
+
+    source: ClassVar[str] = "simulation"
+    kinds: dict[str, str]
+    """Name of the part in each layer."""
+    list_kinds: dict[str, list[str]]
+    """Names of the disturbances and faults, in their order."""
+    reference: SerializeAsAny[ReferencePart]
+    sensing: SerializeAsAny[SensingPart]
+    estimation: SerializeAsAny[EstimationPart]
+    load_control: SerializeAsAny[LoadControlPart]
+    allocation: SerializeAsAny[AllocatorPart]
+    link: SerializeAsAny[LinkPart]
+    position_control: SerializeAsAny[PositionControlPart]
+    attitude_control: SerializeAsAny[AttitudeControlPart]
+    actuation: SerializeAsAny[ActuationPart]
+    detection: SerializeAsAny[DetectionPart]
+    plant: SerializeAsAny[PlantPart]
+    disturbance: list[SerializeAsAny[DisturbancePart]] = Field(default_factory=list)
+    """Disturbances, all at once."""
+    fault: list[SerializeAsAny[FaultPart]] = Field(default_factory=list)
+    """Faults to come."""
+
+    def resolved(self) -> dict[str, Any]:
+        """The whole mission with every default filled in, as plain data (a valid mission file)."""
+        data = self.model_dump(mode="json", exclude={"kinds", "list_kinds"}, exclude_none=True)
+        for layer, kind in self.kinds.items():
+            data[layer] = {"kind": kind, **data[layer]}
+        for name in LISTS:
+            data[name] = [
+                {"kind": kind, **settings}
+                for kind, settings in zip(self.list_kinds[name], data[name], strict=True)
+            ]
+        return data
