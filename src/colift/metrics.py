@@ -7,7 +7,7 @@ rows, since the rows of a real flight are not evenly spaced.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from colift.allocation import Status
 from colift.errors import AbsentSignalError
 from colift.geometry import pairwise_angles
-from colift.mission.schema import Bound
 from colift.recording import Recording
 
 
@@ -29,9 +28,6 @@ class Metric:
     meaning: str
     compute: Callable[[Recording], float]
 
-
-SAFE_ANGLE = 30.0
-"""Angle between cables below which the paper calls a formation unsafe, degrees."""
 
 _METRICS: list[Metric] = []
 
@@ -62,64 +58,6 @@ def _value(metric: Metric, recording: Recording) -> float:
         return math.nan
 
 
-def verdict(recording: Recording, values: Mapping[str, float]) -> tuple[str, str]:
-    """How the flight went, as a level (good, warn or bad) and a sentence."""
-    level = "good" if recording.outcome == "completed" else "bad"
-    words = [recording.outcome[:1].upper() + recording.outcome[1:]]
-    slack = values.get("slack_time_s", math.nan)
-    if slack == 0.0:
-        words.append("no slack")
-    elif slack > 0.0:
-        words.append(f"slack cables for {slack:.3g} s")
-        level = "bad" if level == "bad" else "warn"
-    angle = values.get("min_angle_deg", math.nan)
-    if angle >= SAFE_ANGLE:
-        words.append(f"smallest angle {angle:.1f} deg")
-    elif angle < SAFE_ANGLE:
-        words.append(f"smallest angle {angle:.1f} deg, below {SAFE_ANGLE:g} deg")
-        level = "bad" if level == "bad" else "warn"
-    error = values.get("tracking_max_m", math.nan)
-    if math.isfinite(error) and recording.outcome == "completed":
-        distance = f"{error:.2g} m" if error >= 1.0 else f"{100.0 * error:.2g} cm"
-        words.append(f"load within {distance} of its reference")
-    limited = values.get("allocator_limited", 0.0)
-    if limited > 0:
-        words.append(f"in {limited:.0f} allocations the force gave way to limits")
-    failures = values.get("allocator_failures", 0.0)
-    if failures > 0:
-        words.append(f"{failures:.0f} allocations not ok")
-        level = "bad" if level == "bad" else "warn"
-    return level, "; ".join(words) + "."
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """One criterion of the mission: the metric, its value, the bound in words, and whether it holds."""
-
-    metric: str
-    value: float
-    bound: str
-    holds: bool
-
-
-def judge(recording: Recording, values: Mapping[str, float]) -> list[Judgement]:
-    """The mission's criteria against the flight; empty for a mission without criteria."""
-    return against(recording.mission.criteria, recording.outcome, values)
-
-
-def against(
-    criteria: Mapping[str, Bound], outcome: str, values: Mapping[str, float]
-) -> list[Judgement]:
-    """Criteria against a flight's outcome and metrics; first of all, that it was completed."""
-    if not criteria:
-        return []
-    finished = outcome == "completed"
-    return [Judgement("outcome", float(finished), outcome, finished)] + [
-        Judgement(name, values[name], str(bound), bound.holds(values[name]))
-        for name, bound in criteria.items()
-    ]
-
-
 def tracking_error(recording: Recording) -> NDArray[np.float64]:
     """Load position less reference (rows, 3), m."""
     return np.asarray(recording["load"][:, 0] - recording["reference"][:, 0])
@@ -133,11 +71,14 @@ def integral(values: NDArray[np.float64], time: NDArray[np.float64]) -> float:
 def mean(
     values: NDArray[np.float64], time: NDArray[np.float64], axis: int | None = None
 ) -> NDArray[np.float64]:
-    """Mean over time, s, of what is recorded: each row counts for the time around it.
+    """Mean over time, s, of what is recorded, by the trapezoidal rule: a row counts for half of the time to each neighbour.
 
     Over all values, or with ``axis=0`` over the rows only; NaN where nothing is recorded.
     """
-    spans = np.gradient(time) if len(time) > 1 else np.ones(1)
+    spans = np.ones(1)
+    if len(time) > 1:
+        spans = 0.5 * np.diff(time, prepend=time[0], append=time[-1])
+        spans = spans[:-1] + spans[1:]
     weights = np.where(np.isnan(values), 0.0, spans.reshape(-1, *[1] * (values.ndim - 1)))
     total = weights.sum(axis=axis)
     weighted = (weights * np.nan_to_num(values, posinf=np.inf, neginf=-np.inf)).sum(axis=axis)
@@ -212,6 +153,72 @@ def usual_angle_deg(r: Recording) -> float:
 @_metric("deg", "smallest angle between two wanted cables at any time")
 def min_desired_angle_deg(r: Recording) -> float:
     return _smallest_angle(r["desired_directions"])
+
+
+def _pairs_in_slices(rows: int, n: int) -> Iterator[slice]:
+    """Slices of the rows, so that the memory of what is computed for every pair stays small."""
+    size = max(1, 1_000_000 // n**2)
+    return (slice(k, k + size) for k in range(0, rows, size))
+
+
+@_metric("m", "smallest distance between the centres of two drones at any time")
+def min_drone_distance_m(r: Recording) -> float:
+    positions = r["positions"]
+    one, other = np.triu_indices(positions.shape[1], k=1)
+    if not len(one):
+        return float("nan")
+    near = [
+        np.linalg.norm(positions[part, one] - positions[part, other], axis=-1)
+        for part in _pairs_in_slices(len(positions), positions.shape[1])
+    ]
+    return -_largest(-np.concatenate(near))
+
+
+@_metric(
+    "m",
+    "smallest distance from the centre of a drone to another's cable, taken as straight, at any time",
+)
+def min_cable_distance_m(r: Recording) -> float:
+    positions, load = r["positions"], r["load"][:, 0]
+    n = positions.shape[1]
+    if n < 2:
+        return float("nan")
+    cables = np.where(r["attached"][..., None] == 0.0, np.nan, load[:, None] - positions)
+    least = math.inf
+    for part in _pairs_in_slices(len(positions), n):
+        away = positions[part, :, None] - positions[part, None]  # of drone i from drone j
+        cable = cables[part, None]
+        share = np.sum(away * cable, axis=-1) / np.sum(cable**2, axis=-1)
+        missing = away - np.clip(share, 0.0, 1.0)[..., None] * cable
+        distance = np.linalg.norm(missing, axis=-1)
+        distance[:, np.arange(n), np.arange(n)] = np.nan
+        least = min(least, np.nanmin(distance, initial=math.inf))
+    return float(least) if math.isfinite(least) else float("nan")
+
+
+@_metric(
+    "deg", "largest tilt of a drone that nothing has broken, its thrust axis from the vertical"
+)
+def max_tilt_deg(r: Recording) -> float:
+    q = r["attitudes"]
+    up = 1.0 - 2.0 * (q[..., 1] ** 2 + q[..., 2] ** 2)
+    broken = (r["attached"] == 0.0) | (r["motor_health"] < 1.0).any(axis=2)
+    return _largest(np.degrees(np.arccos(np.clip(np.where(broken, np.nan, up), -1.0, 1.0))))
+
+
+@_metric("1", "largest thrust of a drone as a share of the most that it can give")
+def peak_thrust_fraction(r: Recording) -> float:
+    most = thrust_limits(r)
+    return float("nan") if most is None else _largest(r["applied_thrusts"] / most)
+
+
+def thrust_limits(recording: Recording) -> NDArray[np.float64] | None:
+    """The most that each drone can give (n,), N: by its motors, or else by its allocator's limit; None if unlimited."""
+    settings = recording.mission.resolved()
+    motor = settings.get("actuation", {}).get("max_thrust")
+    drone = settings.get("allocation", {}).get("max_thrust")
+    most = drone if motor is None else 4.0 * np.asarray(motor, dtype=float)
+    return None if most is None else np.broadcast_to(np.asarray(most, dtype=float), recording.n)
 
 
 @_metric("N", "largest simultaneous sum of tensions")

@@ -14,6 +14,7 @@ from colift.mission.mission import Mission
 from colift.mission.recorded import RecordedMission
 from colift.recording import Recording
 from colift.simulation.flight import Flight, Progress
+from colift.verdict import Verdict, judge
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,11 @@ class Run:
     def metrics(self) -> dict[str, float]:
         """Numbers that judge the flight, by name; the name ends in the unit."""
         return metrics.compute(self.recording)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """How the flight went: level, reasons and every criterion."""
+        return judge(self.recording, self.metrics)
 
 
 def run(

@@ -9,7 +9,6 @@ import sys
 import pytest
 
 import colift
-from colift import metrics
 from colift.errors import MissionError
 from colift.mission import load_mission
 
@@ -18,15 +17,23 @@ SHORT = {"timing.duration": 0.3}
 
 def judged(criteria):
     run = colift.run("hover", overrides={**SHORT, "criteria": criteria})
-    return metrics.judge(run.recording, run.metrics)
+    return run.verdict
 
 
-def test_a_mission_without_criteria_is_not_judged():
-    assert judged({}) == []
+def test_a_mission_without_criteria_is_judged_by_the_defaults():
+    verdict = judged({})
+    assert [(each.metric, each.bound, each.asked) for each in verdict.judged] == [
+        ("tracking_max_m", "<= 0.5", False),
+        ("min_height_m", ">= 0", False),
+        ("max_tilt_deg", "<= 90", False),
+        ("min_angle_deg", ">= 30", False),  # what its allocator is asked for
+    ]
+    assert verdict.level == "pass"
+    assert verdict.reasons == []
 
 
 def test_each_criterion_gets_its_verdict():
-    found = judged(
+    verdict = judged(
         {
             "tracking_max_m": {"max": 0.05},
             "min_angle_deg": {"min": 20.0, "max": 89.0},
@@ -34,9 +41,14 @@ def test_each_criterion_gets_its_verdict():
             "tension_integral_10s_Ns": {"max": 1e9},  # not a number in a flight of 0.3 s
         }
     )
-    assert [each.metric for each in found[:2]] == ["outcome", "tracking_max_m"]
-    assert [each.holds for each in found] == [True, True, True, False, False]
-    assert found[2].bound == ">= 20 and <= 89"
+    own = [each for each in verdict.judged if each.asked]
+    assert [each.metric for each in own[:2]] == ["tracking_max_m", "min_angle_deg"]
+    assert [each.holds for each in own] == [True, True, False, False]
+    assert own[1].bound == ">= 20 and <= 89"
+    assert len(verdict.judged) == len(own) + 2  # height and tilt have defaults
+    assert verdict.level == "fail"
+    assert len(verdict.reasons) == 2
+    assert verdict.reasons[0].startswith("peak_tension_N is 0.")
 
 
 @pytest.mark.parametrize(
@@ -64,5 +76,9 @@ def test_the_command_ends_with_the_verdict(tmp_path, limit, code):
         [*command, *sets, "--out", str(tmp_path)], capture_output=True, text=True, check=False
     )
     assert done.returncode == code, done.stderr
-    criteria = json.loads(done.stdout)["criteria"]
-    assert [each["holds"] for each in criteria] == [True, code == 0]
+    said = json.loads(done.stdout)
+    assert {each["metric"]: each["holds"] for each in said["criteria"]}["tracking_max_m"] is (
+        code == 0
+    )
+    assert said["verdict"]["level"] == ("pass" if code == 0 else "fail")
+    assert len(said["verdict"]["reasons"]) == (code != 0)

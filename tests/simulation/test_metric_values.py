@@ -30,6 +30,13 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["desired_tensions"][:] = arrays["tensions"] - 0.25
     arrays["directions"][:] = ring(n, np.radians(40.0))
     arrays["directions"][rows // 2] = ring(n, np.radians(35.0))
+    # Cables of 1 m, as straight as their directions.
+    arrays["positions"][:] = arrays["load"][:, :1] - arrays["directions"]
+    arrays["attitudes"][..., 0] = 1.0
+    tilted = math.radians(25.0)
+    arrays["attitudes"][7, 0] = [math.cos(tilted / 2), 0.0, math.sin(tilted / 2), 0.0]
+    arrays["applied_thrusts"][:] = 1.0
+    arrays["applied_thrusts"][9, -1] = 6.0  # of 12 N
     arrays["desired_directions"][:] = ring(n, np.radians(30.0))
     arrays["slack_times"][-1] = 0.5
     arrays["thrusts"][:] = 1.0
@@ -43,7 +50,10 @@ def synthetic(n=4, duration=20.0, period=0.01):
     cycles["allocator_iterations"][:] = 2.0
     cycles["allocator_iterations"][5] = 12.0
     cycles["allocator_time"][:] = np.arange(101) * 1e-6
-    mission = load_mission("hover", {"drones.count": n, "timing.duration": duration})
+    mission = load_mission(
+        "hover",
+        {"drones.count": n, "timing.duration": duration, "actuation.kind": "motors"},
+    )
     cycle_time = np.arange(101) * 0.01
     return Recording(mission=mission, time=time, cycle_time=cycle_time, arrays={**arrays, **cycles})
 
@@ -54,11 +64,15 @@ def neighbour_angle(cone_deg, n=4):
 
 
 EXPECTED = {
-    "tracking_rms_m": math.sqrt((1001 * 0.03**2 + 1000 * 0.04**2) / 2001),
+    "tracking_rms_m": math.sqrt((1000 * 0.03**2 + 1000 * 0.04**2) / 2000),
     "tracking_max_m": 0.04,
     "min_angle_deg": neighbour_angle(35.0),
     "usual_angle_deg": neighbour_angle(40.0),
     "min_desired_angle_deg": neighbour_angle(30.0),
+    "min_drone_distance_m": 2.0 * math.sin(math.radians(0.5 * neighbour_angle(35.0))),
+    "min_cable_distance_m": math.sin(math.radians(neighbour_angle(35.0))),
+    "max_tilt_deg": 25.0,
+    "peak_thrust_fraction": 0.5,
     "peak_total_tension_N": 21.0,
     "mean_total_tension_N": 11.0,
     "peak_tension_N": 21.0 * 0.4,
@@ -101,6 +115,35 @@ def test_the_angle_of_a_cut_cable_does_not_count():
     cut = recording["attached"][:, 1] == 0.0
     recording["directions"][cut, 1] = recording["directions"][cut, 0]
     assert metrics.compute(recording)["min_angle_deg"] == pytest.approx(neighbour_angle(35.0))
+
+
+def test_what_is_broken_may_turn_over_and_its_cable_is_nowhere():
+    recording = synthetic()
+    cut = recording["attached"][:, 1] == 0.0
+    recording["attitudes"][cut, 1] = [0.0, 1.0, 0.0, 0.0]
+    recording["positions"][cut, 1] = recording["load"][cut, 0] + [0.0, 0.0, -0.4]
+    values = metrics.compute(recording)
+    assert values["max_tilt_deg"] == pytest.approx(25.0)
+    assert values["min_cable_distance_m"] == pytest.approx(0.4)  # to the cables of the others
+    recording["attached"][cut, 1] = 1.0
+    assert metrics.compute(recording)["max_tilt_deg"] == pytest.approx(180.0)
+
+
+def test_means_are_over_time_and_end_rows_count_half():
+    time = np.array([0.0, 1.0, 4.0])
+    values = np.array([6.0, 2.0, 0.0])
+    assert metrics.mean(values, time) == pytest.approx((4.0 * 1.0 + 1.0 * 3.0) / 4.0)
+    assert metrics.mean(np.array([np.nan, 2.0, 0.0]), time) == pytest.approx(2.0 * 2.0 / 3.5)
+    assert metrics.mean(values[:1], time[:1]) == 6.0
+
+
+def test_thrust_is_a_share_of_what_there_is():
+    run = colift.run("hover", timing__duration=0.2)
+    assert math.isnan(run.metrics["peak_thrust_fraction"])  # ideal rotors, no limit
+    limited = {"allocation.max_thrust": 10.0, "timing.duration": 0.2}
+    run = colift.run("hover", overrides=limited)
+    most = run.recording["applied_thrusts"].max()
+    assert run.metrics["peak_thrust_fraction"] == pytest.approx(most / 10.0)
 
 
 def test_a_fault_that_nobody_finds_takes_for_ever():

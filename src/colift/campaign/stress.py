@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from colift import metrics
 from colift.campaign.plan import Case, Labels, without_seed
 from colift.errors import ColiftError, UnknownNameError
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
 from colift.mission.schema import Bound
 from colift.survival import FAULTS, WHOLE_TEAM
+from colift.verdict import Judgement, judgements
 
 Overrides = dict[str, Any]
 Row = Mapping[str, Any]
@@ -175,25 +175,20 @@ class Verdict:
 
     row: Row
     mission: Mission
-    judged: list[metrics.Judgement]
+    judged: list[Judgement]
 
     @property
     def passed(self) -> bool:
-        return bool(self.judged) and all(each.holds for each in self.judged)
+        ended = self.row["status"] == "flown" and self.row["outcome"] == "completed"
+        return ended and all(each.holds for each in self.judged)
 
     @property
     def reason(self) -> str:
         """Why it failed, in words; empty where it passed."""
-        if not self.judged:
+        if self.row["status"] != "flown":
             return str(self.row["error"])
-        missed = (
-            each.bound
-            if each.metric == "outcome"
-            else f"{each.metric} {each.value:.3g}, not {each.bound}"
-            for each in self.judged
-            if not each.holds
-        )
-        return "; ".join(missed)
+        ended = [] if self.row["outcome"] == "completed" else [str(self.row["outcome"])]
+        return "; ".join([*ended, *(str(each) for each in self.judged if not each.holds)])
 
 
 def verdicts(rows: Iterable[Row], missions: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
@@ -201,11 +196,7 @@ def verdicts(rows: Iterable[Row], missions: Mapping[str, Mapping[str, Any]]) -> 
     found = []
     for row in rows:
         mission = load_mission(missions[row["key"]])
-        judged = (
-            metrics.against(mission.criteria, str(row["outcome"]), row)
-            if row["status"] == "flown"
-            else []
-        )
+        judged = judgements(mission, row) if row["status"] == "flown" else []
         found.append(Verdict(row, mission, judged))
     return found
 

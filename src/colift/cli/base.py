@@ -19,10 +19,11 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from colift.simulation.flight import Progress as Report
+    from colift.verdict import Verdict
 
 EXIT_ERROR = 1
 EXIT_USAGE = 2
-EXIT_DIVERGED = 3
+EXIT_LOST = 3
 EXIT_FAILED = 4
 EXIT_INTERRUPTED = 130
 
@@ -114,6 +115,28 @@ def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> Non
         for row in rows:
             table.add_row(*map(escape, row))
         out.print(table)
+
+
+TONES = {"pass": "green", "warn": "yellow", "fail": "red", "lost": "bold red"}
+"""Colours of the levels of a verdict."""
+
+
+def show_verdict(verdict: Verdict) -> None:
+    """Print the verdict and every criterion."""
+    tone = TONES[verdict.level]
+    out.print(f"[{tone}]{escape(verdict.sentence)}[/{tone}]", highlight=False)
+    for each in verdict.judged:
+        mark = "[green]pass[/green]" if each.holds else "[red]FAIL[/red]"
+        default = "" if each.asked else " (default)"
+        said = escape(f"{each.metric} = {each.value:.4g}: {each.bound}{default}")
+        out.print(f"{mark} {said}", highlight=False)
+
+
+def end_with(verdict: Verdict) -> None:
+    """End the command with the exit code of a verdict."""
+    code = {"lost": EXIT_LOST, "fail": EXIT_FAILED}.get(verdict.level)
+    if code is not None:
+        raise typer.Exit(code)
 
 
 def plain(value: Any) -> Any:

@@ -24,13 +24,17 @@ def report(
     from colift import metrics
     from colift.recording import Recording
     from colift.report.html import write_report
+    from colift.verdict import judge
 
     flight = Recording.load(recording)
     numbers = metrics.compute(flight)
     page = write_report(flight, folder or recording.with_suffix(""), metrics=numbers)
-    sentence = metrics.verdict(flight, numbers)[1]
+    verdict = judge(flight, numbers)
     if as_json:
-        emit({"summary": sentence, "metrics": numbers, "report": str(page)})
+        said = {"level": verdict.level, "reasons": verdict.reasons}
+        emit(
+            {"verdict": said, "summary": verdict.sentence, "metrics": numbers, "report": str(page)}
+        )
     else:
-        out.print(f"{escape(flight.mission.name)}: {escape(sentence)}", highlight=False)
+        out.print(f"{escape(flight.mission.name)}: {escape(verdict.sentence)}", highlight=False)
         out.print(escape(str(page)), highlight=False, soft_wrap=True)

@@ -11,17 +11,17 @@ from rich.markup import escape
 from rich.table import Table
 
 from colift.cli.base import (
-    EXIT_DIVERGED,
-    EXIT_FAILED,
     Json,
     Sets,
     With,
     app,
     emit,
+    end_with,
     loading,
     new_folder,
     out,
     progress,
+    show_verdict,
     write_results,
 )
 
@@ -43,7 +43,7 @@ def run(
 ) -> None:
     """Fly a mission; print what happened; write recording, metrics and report.
 
-    Exit code 3 if the flight diverged, 4 if it missed one of the mission's criteria.
+    Exit code 3 if the load or the team was lost, 4 if a criterion was missed: the mission's, or a default.
 
     [bold]Examples[/bold]
 
@@ -66,26 +66,25 @@ def run(
         )
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
-    judged = metrics.judge(flown.recording, flown.metrics)
+    verdict = flown.verdict
     target = folder or new_folder(loaded.name)
     files = write_results(flown, target, report=report)
     if as_json:
         emit(
             {
                 "mission": loaded.name,
+                "verdict": {"level": verdict.level, "reasons": verdict.reasons},
                 "outcome": flown.recording.outcome,
-                "summary": metrics.verdict(flown.recording, flown.metrics)[1],
+                "summary": verdict.sentence,
                 "metrics": flown.metrics,
-                "criteria": [asdict(each) for each in judged],
+                "criteria": [asdict(each) for each in verdict.judged],
                 "loop_time_s": flown.loop_time,
                 "compiled": flown.compiled,
                 "files": {name: str(path) for name, path in files.items()},
             }
         )
     else:
-        table = Table(
-            title=escape(f"{loaded.name}: {flown.recording.outcome}"), title_justify="left"
-        )
+        table = Table(title=escape(loaded.name), title_justify="left")
         table.add_column("metric")
         table.add_column("value", justify="right")
         table.add_column("unit")
@@ -94,13 +93,7 @@ def run(
             value = f"{flown.metrics[metric.name]:.5g}"
             table.add_row(metric.name, value, metric.unit, metric.meaning)
         out.print(table)
-        level, sentence = metrics.verdict(flown.recording, flown.metrics)
-        colour = {"good": "green", "warn": "yellow", "bad": "red"}[level]
-        out.print(f"[{colour}]{escape(sentence)}[/{colour}]")
-        for each in judged:
-            mark = "[green]pass[/green]" if each.holds else "[red]FAIL[/red]"
-            value = "" if each.metric == "outcome" else f" = {each.value:.4g}"
-            out.print(f"{mark} {escape(f'{each.metric}{value}: {each.bound}')}", highlight=False)
+        show_verdict(verdict)
         simulated = loaded.timing.duration
         how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
         out.print(
@@ -109,7 +102,4 @@ def run(
         )
         for name, path in files.items():
             out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
-    if flown.recording.outcome != "completed":
-        raise typer.Exit(EXIT_DIVERGED)
-    if not all(each.holds for each in judged):
-        raise typer.Exit(EXIT_FAILED)
+    end_with(verdict)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from colift.judgement.asking import ACTUAL, QUANTITIES, Judged
-from colift.metrics import SAFE_ANGLE
+from colift.reproduction import THRESHOLD_DEG
 
 BALANCED = 0.02
 """Largest RMS residual, relative to the mean force, of an answer that counts as one."""
@@ -81,7 +81,7 @@ def summary(judged: Sequence[Judged]) -> Tables:
                 [
                     kind,
                     shown(value["min_angle_deg"].min(), 1),
-                    str(np.count_nonzero(value["min_angle_deg"] < SAFE_ANGLE)),
+                    str(np.count_nonzero(value["min_angle_deg"] < THRESHOLD_DEG)),
                     shown(value["tension_ratio"].mean(), 3),
                     shown(np.sqrt(np.mean(value["turn_rms_deg_s"] ** 2)), 0),
                     shown(1e3 * np.sqrt(np.mean(value["residual_rms_N"] ** 2)), 2),

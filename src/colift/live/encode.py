@@ -11,8 +11,8 @@ import numpy as np
 
 from colift.live import protocol
 from colift.live.session import Row, Session
-from colift.metrics import SAFE_ANGLE
 from colift.simulation.signals import LEGEND
+from colift.verdict import limits
 
 PER_DRONE = {
     "positions", "attitudes", "directions", "desired_directions",
@@ -40,7 +40,7 @@ def hello(session: Session, role: str) -> str:
             "name": mission.name,
             "n": mission.drones.count,
             "cable_lengths": mission.team.cable_lengths.tolist(),
-            "safe_angle_deg": SAFE_ANGLE,
+            "safe_angle_deg": limits(mission).angle_deg,
             "legend": _legend(),
             "knobs": [
                 {**vars(knob), "value": values.get(name)} for name, knob in session.knobs.items()

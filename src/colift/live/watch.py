@@ -8,8 +8,8 @@ import numpy as np
 
 from colift.allocation import Status
 from colift.geometry import pairwise_angles
-from colift.metrics import SAFE_ANGLE
 from colift.simulation.flight import Flight
+from colift.verdict import limits
 
 PAUSE = 0.25
 """The same again within this time is no new moment, s."""
@@ -60,15 +60,15 @@ class Watch:
         return found
 
     def _angles(self, flight: Flight) -> list[dict[str, Any]]:
-        n = len(flight.drones)
-        if not 2 <= n <= MOST_PAIRED:
+        n, least = len(flight.drones), limits(flight.mission).angle_deg
+        if least is None or not 2 <= n <= MOST_PAIRED:
             return []
         angles = np.degrees(pairwise_angles(flight.bus.directions))
         worst = int(angles.argmin())
-        if not angles[worst] < SAFE_ANGLE or not self._begins(flight, "angle"):
+        if not angles[worst] < least or not self._begins(flight, "angle"):
             return []
         one, other = (flight.drones[int(k[worst])] + 1 for k in np.triu_indices(n, k=1))
-        text = f"Cables {one} and {other} closer than {SAFE_ANGLE:g} deg"
+        text = f"Cables {one} and {other} closer than {least:g} deg"
         return [event(flight.time, "angle", text)]
 
     def _losses(self, flight: Flight) -> list[dict[str, Any]]:

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from colift.campaign import judge
 from colift.campaign.sweep import METRICS, Over, Point, points
-from colift.metrics import SAFE_ANGLE, all_metrics
+from colift.metrics import all_metrics
 from colift.report import style
 from colift.report.figures import Entry, register
+from colift.reproduction import THRESHOLD_DEG
 
 Row = Mapping[str, Any]
 Rows = Sequence[Row]
@@ -158,7 +159,7 @@ def _by_mission(
 
 
 def _safe_line(axes: Axes) -> None:
-    axes.axhline(SAFE_ANGLE, color=style.LIMIT, linewidth=0.8, linestyle=(0, (4, 3)))
+    axes.axhline(THRESHOLD_DEG, color=style.LIMIT, linewidth=0.8, linestyle=(0, (4, 3)))
 
 
 @dataclass(frozen=True)

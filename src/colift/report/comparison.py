@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from colift.recording import Recording
 from colift.report import panels, style
 from colift.report.figures import Entry, register
+from colift.verdict import limits
 
 Recordings = Mapping[str, Recording]
 """Recordings by the label that they carry in the figure."""
@@ -41,7 +42,7 @@ def angles(recordings: Recordings) -> Figure:
     COMPARISONS,
     "Sensitivity",
     "Left: tension of the cables, the mean as a line and the range over the cables as a band. "
-    "Right: the smallest angle between two cables at each time; 30 degrees dashed.",
+    "Right: the smallest angle between two cables at each time; the angle that the missions ask for dashed.",
 )
 def sensitivity(recordings: Recordings) -> Figure:
     figure, (left, right) = style.grid(columns=2, share=False)
@@ -55,7 +56,8 @@ def sensitivity(recordings: Recordings) -> Figure:
         panels.line(left, flight.time, np.nanmean(values, axis=1), label=label, **look)
         panels.line(right, *panels.smallest_angle(flight), **look)
     panels.focus([left], [np.concatenate(seen, axis=None)])
-    panels.safe_angle(right)
+    asked = [limits(recording.mission).angle_deg for recording in recordings.values()]
+    panels.least_angle(right, max((angle for angle in asked if angle), default=None))
     left.set_ylabel("tension (N)")
     right.set_ylabel("smallest angle (deg)")
     end = max(float(recording.time[-1]) for recording in recordings.values())

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import tomli_w
 
-from colift.metrics import Judgement, all_metrics, judge, verdict
+from colift.metrics import all_metrics
 from colift.recording import Recording, atomic_path
+from colift.verdict import Judgement, judge
 
 if TYPE_CHECKING:
     from colift.report.render import Drawing
@@ -39,7 +40,7 @@ font-size:.85rem}
 .facts li{border:1px solid var(--rule);border-radius:1rem;padding:.1rem .7rem}
 .banner{border-left:.35rem solid var(--tone);background:var(--card);padding:.7rem 1rem;
 border-radius:.25rem;margin:1.2rem 0;font-weight:600}
-.good{--tone:var(--good)}.warn{--tone:var(--warn)}.bad{--tone:var(--bad)}
+.pass{--tone:var(--good)}.warn{--tone:var(--warn)}.fail,.lost{--tone:var(--bad)}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
 th{text-align:left;font-weight:600;font-size:.82rem}
@@ -99,7 +100,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequenc
 
 
 def banner(level: str, text: str) -> str:
-    """One sentence that stands out; ``level`` is good, warn or bad."""
+    """One sentence that stands out; ``level`` is one of :data:`colift.verdict.LEVELS`."""
     return f'<p class="banner {level}">{escape(text)}</p>'
 
 
@@ -180,12 +181,12 @@ def report(
     replay: str | None = None,
 ) -> str:
     """The page of one flight; ``replay`` is the file beside it that replays the flight."""
-    mission = recording.mission
+    mission, verdict = recording.mission, judge(recording, metrics)
     versions = "\n".join(f"{name:9} {text}" for name, text in recording.versions.items())
     parts = [
         f"<header><h1>{escape(mission.name)}</h1>",
         f'<p class="soft">{escape(mission.description)}</p></header>',
-        banner(*verdict(recording, metrics)),
+        banner(verdict.level, verdict.sentence),
         facts(
             [
                 f"{recording.n} drone{'s' * (recording.n != 1)}",
@@ -195,7 +196,7 @@ def report(
                 f"colift {recording.versions.get('colift', '?')}",
             ]
         ),
-        criteria_table(judge(recording, metrics)),
+        criteria_table(verdict.judged),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
         frame(replay) if replay else "",
@@ -240,15 +241,16 @@ def _provenance(recording: Recording) -> list[str]:
 
 
 def criteria_table(judged: Sequence[Judgement]) -> str:
-    """The mission's criteria, each with a verdict in words; nothing for a mission without any."""
+    """Every criterion with a verdict in words; nothing where none applies."""
     if not judged:
         return ""
     rows = []
     for each in judged:
-        value = "" if each.metric == "outcome" else f"{each.value:.4g}"
-        level, word = ("good", "pass") if each.holds else ("bad", "fail")
-        mark = f'<b class="{level}" style="color:var(--tone)">{word}</b>'
-        rows.append((f"<code>{escape(each.metric)}</code>", value, escape(each.bound), mark))
+        word = "pass" if each.holds else "fail"
+        mark = f'<b class="{word}" style="color:var(--tone)">{word}</b>'
+        bound = each.bound if each.asked else f"{each.bound} (default)"
+        name = f"<code>{escape(each.metric)}</code>"
+        rows.append((name, f"{each.value:.4g}", escape(bound), mark))
     return "<h2>Criteria</h2>" + table(
         ("Quantity", "Value", "Bound", "Verdict"), rows, numbers=(1,)
     )

@@ -16,6 +16,7 @@ from colift.recording import atomic_path
 from colift.report import html, panels, style
 from colift.report.figures import Entry, register
 from colift.report.render import draw
+from colift.reproduction import THRESHOLD_DEG
 
 INTRODUCTION = (
     "The force that the load controller asked for in flight goes through every allocator. All see the same "
@@ -74,7 +75,7 @@ def separation(judged: Sequence[Judged]) -> Figure:
     SINGLE,
     "Smallest angle over time",
     "Smallest angle between two cables that each allocator wanted; black what was wanted on board, grey "
-    "what the cables did; 30 degrees dashed.",
+    "what the cables did; the paper's 30 degrees dashed.",
 )
 def smallest(judged: Judged) -> Figure:
     figure, (axes,) = style.grid(height=2.2, legend_rows=2)
@@ -85,7 +86,7 @@ def smallest(judged: Judged) -> Figure:
             zorder=3.0 if kind in (ON_BOARD, ACTUAL) else 2.0, **lines,
         )  # fmt: skip
     axes.set_xlim(0.0, float(judged.answers[0].time[-1]))
-    panels.safe_angle(axes)
+    panels.least_angle(axes, THRESHOLD_DEG)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("smallest angle (deg)")
     style.legend(figure, rows=2)

@@ -15,9 +15,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
-from colift.metrics import SAFE_ANGLE, tracking_error
+from colift.metrics import tracking_error
 from colift.recording import Recording
 from colift.report import style
+from colift.verdict import limits
 
 Array = NDArray[np.float64]
 
@@ -268,7 +269,7 @@ def angles(axes: Axes, recording: Recording) -> Array:
             label="nearest neighbours",
         )
         line(axes, time, near.min(axis=1), color=style.PALETTE[0], label="closest pair")
-    safe_angle(axes)
+    least_angle(axes, limits(recording.mission).angle_deg)
     axes.set_ylabel("angle between cables (deg)")
     return FREE
 
@@ -279,12 +280,19 @@ def pair(i: int, j: int) -> dict[str, Any]:
     return {"color": first, "gapcolor": second, "linestyle": (0, (4, 4)), "linewidth": 1.6}
 
 
-def safe_angle(axes: Axes) -> None:
-    """The dashed line of the safety threshold; the axis starts at zero."""
-    axes.axhline(
-        SAFE_ANGLE, color=style.LIMIT, linestyle=(0, (5, 3)), linewidth=1.0, label="30° limit"
-    )
-    axes.set_ylim(0.0, max(axes.get_ylim()[1], SAFE_ANGLE * 1.2))
+def least_angle(axes: Axes, degrees: float | None) -> None:
+    """A dashed line at the angle that was asked for, if any was; the axis starts at zero."""
+    top = axes.get_ylim()[1]
+    if degrees is not None:
+        axes.axhline(
+            degrees,
+            color=style.LIMIT,
+            linestyle=(0, (5, 3)),
+            linewidth=1.0,
+            label=f"{degrees:g}° limit",
+        )
+        top = max(top, degrees * 1.2)
+    axes.set_ylim(0.0, top)
 
 
 def allocator_time(axes: Axes, recording: Recording) -> None:

@@ -74,7 +74,7 @@ def write_stress(
         '<p class="soft">Each condition replaces the mission\'s world; the controllers are told of none of it.'
         "</p></header>",
         html.banner(
-            "warn" if failing else "good",
+            "warn" if failing else "pass",
             f"{len(found) - len(failing)} of {len(found)} flights pass.",
         ),
         html.facts([f"{len(tables[0][2])} conditions", f"{len(found)} flights", *sorted(criteria)]),
@@ -100,7 +100,7 @@ def _matrix(title: str, header: list[str], lines: list[list[str]]) -> str:
 
 def _marked(text: str) -> str:
     passed, _, flown = text.partition(",")[0].partition("/")
-    level = "good" if passed == flown else "bad" if passed == "0" else "warn"
+    level = "pass" if passed == flown else "fail" if passed == "0" else "warn"
     return f'<span class="{level}" style="color:var(--tone)">{escape(text)}</span>'
 
 

@@ -13,8 +13,9 @@ import tomli_w
 from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
-from colift.metrics import SAFE_ANGLE, all_metrics, compute, tracking_error, verdict
+from colift.metrics import all_metrics, compute, tracking_error
 from colift.recording import Recording
+from colift.verdict import judge, limits
 from colift.viewer.events import angle_pairs, find_events
 
 Array = NDArray[np.float64]
@@ -75,16 +76,17 @@ def _flight(
     events = find_events(recording)
     signals = _signals(recording)
     rows = _rows(recording, [event["time"] for event in events], signals, budget)
-    level, sentence = verdict(recording, metrics)
+    verdict = judge(recording, metrics)
     return {
         "name": mission.name,
         "label": label,
         "description": mission.description,
-        "level": level,
-        "verdict": sentence,
+        "level": verdict.level,
+        "verdict": verdict.sentence,
+        "reasons": verdict.reasons,
         "n": recording.n,
         "cable_lengths": mission.team.cable_lengths.tolist(),
-        "safe_angle_deg": SAFE_ANGLE,
+        "safe_angle_deg": limits(mission).angle_deg,
         "weight": mission.load.mass * mission.world.gravity,
         "thrust": (mission.load.mass + mission.team.masses.sum())
         * mission.world.gravity

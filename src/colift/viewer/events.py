@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from colift.allocation import Status
 from colift.geometry import pairwise_angles
-from colift.metrics import SAFE_ANGLE
 from colift.mission.schema import Event
 from colift.recording import Recording
+from colift.verdict import limits
 
 PAUSE = 0.25
 """Two stretches of the same kind closer than this are one, s."""
@@ -84,18 +84,18 @@ def _fallback(recording: Recording) -> list[dict[str, Any]]:
 
 
 def _angle(recording: Recording) -> list[dict[str, Any]]:
-    n = recording.n
-    if not angle_pairs(n):
+    n, least = recording.n, limits(recording.mission).angle_deg
+    if least is None or not angle_pairs(n):
         return []
     angles = np.degrees(pairwise_angles(recording["directions"]))
     one, other = np.triu_indices(n, k=1)
     found = []
-    for first, last in _stretches(recording.time, np.any(angles < SAFE_ANGLE, axis=1)):
+    for first, last in _stretches(recording.time, np.any(angles < least, axis=1)):
         part = np.where(np.isfinite(angles[first : last + 1]), angles[first : last + 1], np.inf)
         pair = int(part.min(axis=0).argmin())
         text = (
             f"Cables {one[pair] + 1} and {other[pair] + 1} down to {part.min():.1f} deg, "
-            f"below {SAFE_ANGLE:g} deg for {recording.time[last] - recording.time[first]:.3g} s"
+            f"below {least:g} deg for {recording.time[last] - recording.time[first]:.3g} s"
         )
         found.append(_event(recording.time[first], "angle", text))
     return found
