@@ -158,7 +158,7 @@ def test_a_released_load_is_lost_everywhere(tmp_path):
     assert 'class="banner lost"' in page
 
 
-SHARED = Path(__file__).parents[2].parent / "shared" / "cases" / "missions"
+SHARED = Path(__file__).parents[3] / "shared" / "cases" / "missions"
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the collected field cases are not here")
