@@ -10,41 +10,65 @@ class ColiftError(Exception):
     """Root of all errors raised by colift."""
 
 
-class UnknownNameError(ColiftError):
+class UnknownNameError(ColiftError, LookupError):
     """A part, mission or signal was asked for by a name that does not exist."""
 
     def __init__(self, what: str, name: str, valid: Sequence[str]) -> None:
-        import difflib
-
-        near = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]!r}?" if near else "."
-        super().__init__(f"no {what} named {name!r}{hint} Available: {', '.join(valid)}.")
+        super().__init__(what, name, valid)
+        self.what = what
         self.name = name
         self.valid = tuple(valid)
+
+    def __str__(self) -> str:
+        import difflib
+
+        near = difflib.get_close_matches(self.name, self.valid, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]!r}?" if near else "."
+        return f"no {self.what} named {self.name!r}{hint} Available: {', '.join(self.valid)}."
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake in a mission: where, what was found, what is allowed."""
+    """One mistake in what was asked for: where, what was found, what is allowed."""
 
     path: str
     value: str
     message: str
 
     def __str__(self) -> str:
+        where = f"{self.path}: " if self.path else ""
         found = f" (found {self.value})" if self.value else ""
-        return f"{self.path}: {self.message}{found}"
+        return f"{where}{self.message}{found}"
+
+
+class SettingError(ColiftError, ValueError):
+    """Settings or arguments were refused: of each its name, what was found and what is allowed."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        super().__init__(problems)
+        self.problems = tuple(problems)
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.problems))
+
+    @classmethod
+    def of(cls, path: str, value: object, message: str) -> SettingError:
+        """A single mistake."""
+        return cls([Problem(path, str(value), message)])
 
 
 class MissionError(ColiftError):
     """A mission is not valid; carries every problem that was found, not only the first."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
+        super().__init__(source, problems)
         self.source = source
         self.problems = tuple(problems)
-        lines = "\n".join(f"  {problem}" for problem in problems)
-        count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
-        super().__init__(f"{source}: {count}\n{lines}")
+
+    def __str__(self) -> str:
+        lines = "\n".join(f"  {problem}" for problem in self.problems)
+        count = f"{len(self.problems)} problem" + ("s" if len(self.problems) != 1 else "")
+        return f"{self.source}: {count}\n{lines}"
 
 
 class MissingExtraError(ColiftError):

@@ -15,6 +15,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -46,12 +47,12 @@ _FASTMATH = {"contract"}
 
 
 def kernel(signature: Any) -> Callable[[F], F]:
-    """Compile a kernel for one explicit signature, cached on disk."""
+    """Compile a kernel for one explicit signature, cached on disk; called from Python, it lets other threads run."""
 
     def decorate(function: F) -> F:
         with _cache_for(function):
             compiled: F = numba.njit(
-                signature, cache=True, error_model="numpy", fastmath=_FASTMATH
+                signature, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH
             )(function)
         return compiled
 
@@ -64,6 +65,9 @@ def inline(function: F) -> F:
     return cast(F, compiled)
 
 
+_one_at_a_time = threading.RLock()  # for Numba's setting, which is the whole process's
+
+
 @contextmanager
 def _cache_for(function: Callable[..., Any]) -> Iterator[None]:
     """Let Numba cache under a digest of the sources that a kernel of this folder can be made of.
@@ -71,12 +75,13 @@ def _cache_for(function: Callable[..., Any]) -> Iterator[None]:
     Numba looks at the kernel's own file only: after a change of a helper elsewhere it would go on
     with the old machine code.
     """
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename).parent))
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before
+    with _one_at_a_time:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(cache_folder(Path(function.__code__.co_filename).parent))
+        try:
+            yield
+        finally:
+            config.CACHE_DIR = before
 
 
 @cache

@@ -15,14 +15,16 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic._internal._model_construction import ModelMetaclass
 
-from colift.errors import ColiftError, UnknownNameError
+from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.team import Team
+from colift.wording import problems_of
 
 Vector = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -48,8 +50,21 @@ LISTS = ("disturbance", "fault")
 FOLDERS = (*LAYERS, *LISTS)
 """Every folder of parts."""
 
+KIND = ("kind",)
+"""Key beside a part's settings in a mission's section."""
 
-class Part(BaseModel):
+
+class _PartType(ModelMetaclass):
+    """Calling a part's class with settings that it refuses raises an error of ours."""
+
+    def __call__(cls, *args: Any, **settings: Any) -> Any:  # noqa: N805
+        try:
+            return super().__call__(*args, **settings)
+        except ValidationError as error:
+            raise SettingError(problems_of(error, cast(type[BaseModel], cls), settings)) from error
+
+
+class Part(BaseModel, metaclass=_PartType):
     """Settings of one implementation of one layer.
 
     A subclass declares its fields, names its ``kernel`` and packs the fields for it. Kernels may be
@@ -64,6 +79,12 @@ class Part(BaseModel):
     kernel: ClassVar[Callable[..., Any]]
     needs: ClassVar[tuple[str, str] | None] = None
     """Package beyond colift's own that the kernel calls, and the extra that installs it."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        try:
+            super().__setattr__(name, value)
+        except ValidationError as error:
+            raise SettingError(problems_of(error, type(self), {name: value})) from error
 
     def of(self, drones: Sequence[int]) -> Self:
         """Settings for the team of these drones; one with values per drone keeps theirs."""
@@ -208,12 +229,12 @@ def make(layer: str, table: Mapping[str, Any]) -> Part:
     ------
     UnknownNameError
         For a kind that the layer does not have.
-    ValueError
-        For settings that the part refuses (a pydantic ``ValidationError``).
+    SettingError
+        For settings that the part refuses.
 
     """
     settings = dict(table)
-    return find(layer, str(settings.pop("kind", ""))).model_validate(settings)
+    return find(layer, str(settings.pop("kind", "")))(**settings)
 
 
 def kind_of(part: type[Part]) -> str:

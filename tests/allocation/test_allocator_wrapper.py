@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from colift.allocation.base import Allocator, Status
 from colift.allocation.ring import Ring
 from colift.allocation.sqp import Sqp, SqpAllocator
+from colift.errors import SettingError
 from colift.geometry import ring
 from colift.team import Team
 
@@ -47,14 +47,14 @@ def flown() -> SqpAllocator:
 )
 def test_a_refused_setting_changes_nothing(flown, settings):
     before = state(flown)
-    with pytest.raises(ValidationError, match=list(settings)[-1]):
+    with pytest.raises(SettingError, match=list(settings)[-1]):
         flown.update(**settings)
     assert state(flown) == before
 
 
 def test_a_refused_mu_changes_nothing(flown):
     before = state(flown)
-    with pytest.raises(ValidationError):
+    with pytest.raises(SettingError):
         flown.mu = -1.0
     assert state(flown) == before
     assert flown.mu == 0.15
@@ -74,20 +74,26 @@ def test_mu_may_change_between_two_calls_and_keeps_the_warm_start(flown):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"directions": np.ones((3, 3))}, r"directions must have shape \(4, 3\), got \(3, 3\)"),
-        ({"directions": np.ones(3)}, r"directions must have shape \(4, 3\), got \(3,\)"),
-        ({"tensions": np.ones(3)}, r"tensions must have shape \(4,\), got \(3,\)"),
-        ({"tensions": 1.0}, r"tensions must have shape \(4,\), got \(\)"),
+        (
+            {"directions": np.ones((3, 3))},
+            r"directions: must have shape \(4, 3\) \(found shape \(3, 3\)\)",
+        ),
+        (
+            {"directions": np.ones(3)},
+            r"directions: must have shape \(4, 3\) \(found shape \(3,\)\)",
+        ),
+        ({"tensions": np.ones(3)}, r"tensions: must have shape \(4,\) \(found shape \(3,\)\)"),
+        ({"tensions": 1.0}, r"tensions: must have shape \(4,\) \(found shape \(\)\)"),
         ({"directions": np.zeros((4, 3))}, "not zero"),
         ({"directions": np.full((4, 3), np.nan)}, "finite"),
-        ({"tensions": [1.0, 1.0, -1e-9, 1.0]}, "not negative"),
+        ({"tensions": [1.0, 1.0, -1e-9, 1.0]}, "at least 0"),
         ({"tensions": [1.0, 1.0, np.nan, 1.0]}, "finite"),
-        ({"directions": ring(4, 0.3), "tensions": np.ones(5)}, r"tensions .* got \(5,\)"),
+        ({"directions": ring(4, 0.3), "tensions": np.ones(5)}, r"tensions: .* \(5,\)"),
     ],
 )
 def test_a_refused_start_names_the_fault_and_changes_nothing(flown, arguments, message):
     before = state(flown)
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(SettingError, match=message):
         flown.reset(**arguments)
     assert state(flown) == before
 
@@ -95,9 +101,9 @@ def test_a_refused_start_names_the_fault_and_changes_nothing(flown, arguments, m
 @pytest.mark.parametrize("force", [2.2, [2.2], [0.0, 2.2], [[0.0, 0.0, 2.2]], np.zeros((3, 1))])
 def test_a_force_without_three_components_is_refused_and_changes_nothing(flown, force):
     before = state(flown)
-    with pytest.raises(ValueError, match=r"force must have shape \(3,\)"):
+    with pytest.raises(SettingError, match=r"force: must have shape \(3,\)"):
         flown.allocate(force)
-    with pytest.raises(ValueError, match=r"acceleration must have shape \(3,\)"):
+    with pytest.raises(SettingError, match=r"acceleration: must have shape \(3,\)"):
         flown.allocate(HOVER, force)
     assert state(flown) == before
 
@@ -136,7 +142,7 @@ def test_the_number_of_drones_may_be_any_integer_or_a_team(n):
 
 @pytest.mark.parametrize("n", [0, -1])
 def test_fewer_than_one_drone_is_refused(n):
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(SettingError, match="at least 1"):
         SqpAllocator(n)
 
 

@@ -14,7 +14,7 @@ import colift
 from colift import jit, part
 from colift.allocation import base as allocation
 from colift.disturbance import base as disturbance
-from colift.errors import ColiftError, UnknownNameError
+from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.fault.base import LOAD
 from colift.mission import load_mission
 from colift.plant.base import Start
@@ -89,11 +89,11 @@ class TestEveryPart:
 
     def test_refuses_unknown_settings_and_numbers_that_are_not_finite(self, layer, name):
         found = part.find(layer, name)
-        with pytest.raises(ValueError, match="Extra inputs"):
+        with pytest.raises(SettingError, match="no_such_setting: unknown key"):
             found(no_such_setting=1.0)
         for field, info in found.model_fields.items():
             if info.annotation is float:
-                with pytest.raises(ValueError, match=field):
+                with pytest.raises(SettingError, match=f"^{field}: must be a finite number"):
                     found(**{field: float("nan")})
 
     def test_settings_survive_a_mission_file(self, layer, name):

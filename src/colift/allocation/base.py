@@ -5,18 +5,21 @@ An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i 
 
 from __future__ import annotations
 
-import operator
+import math
+from collections.abc import Sequence
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from colift.allocation._status import Status as Status
-from colift.geometry import ring
+from colift.errors import Problem, SettingError
+from colift.geometry import ring, widest_gap
 from colift.jit import f8, i8, matrix, vector
 from colift.part import Part
 from colift.team import Team
+from colift.wording import numbers, shown
 
 SIGNATURE = i8(vector, vector, f8, vector, vector, vector, matrix, vector)
 """``kernel(force, acceleration, dt, params, memory, tensions, directions, info) -> status``.
@@ -45,6 +48,24 @@ class AllocatorPart(Part):
     layer: ClassVar[str] = "allocation"
     spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
     """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
+    per_cable: ClassVar[tuple[str, ...]] = ()
+    """Settings that may be a list with one value per cable."""
+
+    def of(self, drones: Sequence[int]) -> Self:
+        lists = {
+            name: [value[drone] for drone in drones]
+            for name in self.per_cable
+            if isinstance(value := getattr(self, name), list)
+        }
+        return self.model_copy(update=lists) if lists else self
+
+    def wrong_lengths(self, n: int) -> list[tuple[str, str]]:
+        """Lists with one value per cable whose length is not the number of cables, as for :meth:`check`."""
+        return [
+            (name, f"{len(value)} values; must be one value or one for each of {n} drones")
+            for name in self.per_cable
+            if isinstance(value := getattr(self, name), list) and len(value) != n
+        ]
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""
@@ -129,10 +150,14 @@ class Allocation:
 
 _STATUS = tuple(Status)
 _REST = np.zeros(3)
+_SHORTEST, _LONGEST = 1e-6, 1e3  # s; what lies outside, or is no number, counts as these
 
 
 class Allocator:
     """Calls one allocator outside the simulation loop, warm-started by its own last answer.
+
+    An object belongs to one thread at a time; different objects may be called in different threads, and
+    run at the same time: a kernel does not hold Python's global lock.
 
     Parameters
     ----------
@@ -141,36 +166,57 @@ class Allocator:
     team : Team or int
         The drones and load, or just the number of drones (then the paper's drones and load).
     cone_deg : float
-        Half-angle of the ring that :meth:`reset` starts from.
+        Half-angle of the ring that :meth:`reset` starts from, and within which :meth:`join` looks for a gap.
     dt : float
-        Time between two calls, s; only allocators that limit rates use it.
+        Time between two calls, s, unless a call says otherwise; only allocators that limit rates use it.
+
+    Raises
+    ------
+    SettingError
+        For arguments that cannot be used; the message names them.
 
     """
 
     def __init__(
         self, part: AllocatorPart, team: Team | int, *, cone_deg: float = 35.0, dt: float = 0.01
     ) -> None:
-        if not isinstance(team, Team):
-            n = operator.index(team)  # any kind of integer, NumPy's too
-            if n < 1:
-                raise ValueError(f"n must be at least 1, got {n}")
-            team = Team.uniform(n)
+        if not isinstance(part, AllocatorPart):
+            raise SettingError.of("part", shown(part), "must be an allocator's settings")
         self.part = part
-        self.team = team
-        self.dt = float(dt)
-        self._cone = float(np.radians(cone_deg))
+        self._whole = team if isinstance(team, Team) else Team.uniform(team)
+        self.dt = float(numbers("dt", dt, (), above=0.0))
+        self._cone = math.radians(float(numbers("cone_deg", cone_deg, (), above=0.0, below=180.0)))
+        if problems := part.wrong_lengths(self._whole.n):
+            raise SettingError([Problem(name, "", message) for name, message in problems])
         self._kernel = type(part).kernel  # through the class: no binding as a method
         self._force = np.zeros(3)
         self._acceleration = np.zeros(3)
-        self._tensions = np.zeros(team.n)
-        self._directions = np.zeros((team.n, 3))
         self._info = np.zeros(INFO_SIZE)
+        self._bind(range(self._whole.n))
         self.reset()
 
     @property
     def n(self) -> int:
         """Number of cables."""
-        return self.team.n
+        return len(self.drones)
+
+    @property
+    def team(self) -> Team:
+        """The drones that carry, and the load."""
+        return self._team
+
+    @property
+    def drones(self) -> tuple[int, ...]:
+        """Numbers of the drones that carry, in the order of the answers; those of the team at the start."""
+        return self._drones
+
+    def _bind(self, drones: Sequence[int]) -> None:
+        self._drones = tuple(drones)
+        self._team = self._whole.of(self._drones)
+        self._tensions = np.zeros(self.n)
+        self._directions = np.zeros((self.n, 3))
+        self._params = self.part.of(self._drones).params(self._team)
+        self._memory = self.part.of(self._drones).memory(self._team)
 
     def reset(self, directions: ArrayLike | None = None, tensions: ArrayLike | None = None) -> None:
         """Forget the last answer and start from the given one, or from the default ring.
@@ -184,41 +230,107 @@ class Allocator:
 
         Raises
         ------
-        ValueError
+        SettingError
             For a wrong shape, a value that is not finite, a zero direction or a negative tension.
 
         """
         n = self.n
-        start = ring(n, self._cone) if directions is None else np.array(directions, dtype=float)
-        if start.shape != (n, 3):
-            raise ValueError(f"directions must have shape ({n}, 3), got {start.shape}")
-        norms = np.linalg.norm(start, axis=1)
-        if not (np.isfinite(norms).all() and (norms > 0).all()):
-            raise ValueError("directions must be finite and not zero")
-        share = np.zeros(n) if tensions is None else np.array(tensions, dtype=float)
-        if share.shape != (n,):
-            raise ValueError(f"tensions must have shape ({n},), got {share.shape}")
-        if not (np.isfinite(share).all() and (share >= 0).all()):
-            raise ValueError("tensions must be finite and not negative")
-        self._directions[:] = start / norms[:, None]
+        start = ring(n, self._cone) if directions is None else _units(directions, (n, 3))
+        share = np.zeros(n) if tensions is None else numbers("tensions", tensions, (n,), least=0.0)
+        self._bind(self._drones)
+        self._directions[:] = start
         self._tensions[:] = share
-        self._params = self.part.params(self.team)
-        self._memory = self.part.memory(self.team)
 
     def update(self, **settings: Any) -> None:
         """Change settings between two calls; the warm start is kept.
 
         Raises
         ------
-        pydantic.ValidationError
+        SettingError
             For an unknown setting or a value out of range; nothing is changed then.
 
         """
-        fields = {**self.part.model_dump(), **settings}
-        self.part = type(self.part).model_validate(fields)
-        self._params[:] = self.part.params(self.team)
+        part = type(self.part)(**{**self.part.model_dump(), **settings})
+        if problems := part.wrong_lengths(self._whole.n):
+            raise SettingError([Problem(name, "", message) for name, message in problems])
+        self.part = part
+        self._params[:] = part.of(self._drones).params(self._team)
 
-    def allocate(self, force: ArrayLike, acceleration: ArrayLike | None = None) -> Allocation:
+    def lose(self, drone: int) -> None:
+        """Go on without one drone, now; the others keep their numbers and their warm start.
+
+        Raises
+        ------
+        SettingError
+            For a drone that does not carry, or the last one.
+
+        """
+        rest = [other for other in self._drones if other != drone]
+        if len(rest) == self.n:
+            carrying = ", ".join(map(str, self._drones))
+            raise SettingError.of(
+                "drone", shown(drone), f"must be one of those that carry: {carrying}"
+            )
+        if not rest:
+            raise SettingError.of("drone", shown(drone), "is the last one that carries")
+        self._go_on(rest)
+
+    def join(self, drone: int | None = None, direction: ArrayLike | None = None) -> int:
+        """Take a drone of the team back in, now; the others keep their warm start.
+
+        Parameters
+        ----------
+        drone : int, optional
+            Its number in the team at the start; the lowest that does not carry when left out.
+        direction : (3,) array, optional
+            Of its cable, from drone to load, world frame; the widest gap between the others' when left out.
+
+        Returns
+        -------
+        int
+            The drone's number.
+
+        Raises
+        ------
+        SettingError
+            For a drone that carries already or is not of the team, or a direction that is none.
+
+        """
+        away = [other for other in range(self._whole.n) if other not in self._drones]
+        if drone is None and away:
+            drone = away[0]
+        if drone not in away:
+            others = ", ".join(map(str, away)) or "none"
+            raise SettingError.of(
+                "drone", shown(drone), f"must be one of those that do not carry: {others}"
+            )
+        cable = self._gap() if direction is None else _units(direction, (3,), "direction")
+        self._go_on(sorted([*self._drones, drone]))
+        self._directions[self._drones.index(drone)] = cable
+        return int(drone)
+
+    def _gap(self) -> NDArray[np.float64]:
+        """Where a cable that joins is hung: as far from the others as the start's cone has room."""
+        return widest_gap(self._directions, self._cone)
+
+    def _go_on(self, drones: Sequence[int]) -> None:
+        """With these drones, as a flight does: who stays keeps its row, and the kernel what it remembers."""
+        before, tensions, directions, memory = (
+            self._drones, self._tensions, self._directions, self._memory,
+        )  # fmt: skip
+        self._bind(drones)
+        places = np.array([before.index(d) if d in before else -1 for d in drones], dtype=np.int64)
+        stay = places >= 0
+        self._tensions[stay] = tensions[places[stay]]
+        self._directions[stay] = directions[places[stay]]
+        self._memory = self.part.carry_over(memory, self._memory, places)
+
+    def allocate(
+        self,
+        force: ArrayLike,
+        acceleration: ArrayLike | None = None,
+        dt: float | None = None,
+    ) -> Allocation:
         """Share ``force`` among the cables.
 
         Parameters
@@ -228,6 +340,9 @@ class Allocator:
         acceleration : (3,) array, optional
             Wanted acceleration of the load, m/s^2, for allocators that respect thrust limits;
             zero when left out.
+        dt : float, optional
+            Time since the last call, s, for allocators that limit rates; the allocator's own ``dt`` when
+            left out. What is not positive, or no number, counts as no time at all: nothing turns.
 
         Returns
         -------
@@ -236,23 +351,29 @@ class Allocator:
 
         Raises
         ------
-        ValueError
-            Only when ``force`` or ``acceleration`` does not have three components.
+        SettingError
+            Only when ``force`` or ``acceleration`` is not three numbers, or ``dt`` not one.
 
         """
-        wanted = np.asarray(force, dtype=float)
-        if wanted.shape != (3,):
-            raise ValueError(f"force must have shape (3,), got {wanted.shape}")
-        motion = _REST if acceleration is None else np.asarray(acceleration, dtype=float)
-        if motion.shape != (3,):
-            raise ValueError(f"acceleration must have shape (3,), got {motion.shape}")
+        try:
+            wanted = np.asarray(force, dtype=float)
+            motion = _REST if acceleration is None else np.asarray(acceleration, dtype=float)
+            period = min(_LONGEST, max(_SHORTEST, self.dt if dt is None else float(dt)))
+        except (TypeError, ValueError):
+            wanted = motion = np.empty(0)
+        if wanted.shape != (3,) or motion.shape != (3,):
+            numbers("force", force, (3,), finite=False)
+            numbers(
+                "acceleration", _REST if acceleration is None else acceleration, (3,), finite=False
+            )
+            numbers("dt", self.dt if dt is None else dt, (), finite=False)
         self._force[:] = wanted
         self._acceleration[:] = motion
         start = perf_counter()
         status = self._kernel(
             self._force,
             self._acceleration,
-            self.dt,
+            period,
             self._params,
             self._memory,
             self._tensions,
@@ -267,3 +388,16 @@ class Allocator:
             self._info.copy(),
             elapsed,
         )
+
+
+def _units(
+    directions: ArrayLike, shape: tuple[int, ...], name: str = "directions"
+) -> NDArray[np.float64]:
+    """Directions of any length but zero, as unit vectors."""
+    found = numbers(name, directions, shape)
+    norms = np.linalg.norm(found, axis=-1, keepdims=True)
+    if not (np.isfinite(norms) & (norms > 0.0)).all():
+        raise SettingError.of(
+            name, shown(found.tolist()), "must have lengths that are finite and not zero"
+        )
+    return np.asarray(found / norms)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +25,8 @@ from colift.allocation.base import (
     AllocatorPart,
     Status,
 )
-from colift.geometry import pairwise_angles, ring
+from colift.errors import Problem, SettingError
+from colift.geometry import pairwise_angles, ring, widest_gap
 from colift.jit import kernel
 from colift.part import Vector
 from colift.team import Team
@@ -231,6 +231,7 @@ class Safe(AllocatorPart):
 
     kernel = _allocate
     spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
+    per_cable = ("tension_min", "tension_max", "max_thrust", "weights")
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""
@@ -281,11 +282,7 @@ class Safe(AllocatorPart):
         return self
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        problems = [
-            (name, f"{len(value)} values; must be one value or one for each of {team.n} drones")
-            for name in ("tension_min", "tension_max", "max_thrust", "weights")
-            if isinstance(value := getattr(self, name), list) and len(value) != team.n
-        ]
+        problems = self.wrong_lengths(team.n)
         if problems:
             return problems
         if self.max_thrust is not None:
@@ -304,14 +301,6 @@ class Safe(AllocatorPart):
 
     def cannot_hold(self, team: Team) -> list[str]:
         return list(feasible.feasibility(team, self).conflicts)
-
-    def of(self, drones: Sequence[int]) -> Self:
-        lists = {
-            name: [value[drone] for drone in drones]
-            for name in ("tension_min", "tension_max", "max_thrust", "weights")
-            if isinstance(value := getattr(self, name), list)
-        }
-        return self.model_copy(update=lists)
 
     def tension_caps(self, n: int) -> Vector:
         """Largest tension of each cable (n,), N."""
@@ -376,13 +365,38 @@ class Safe(AllocatorPart):
         return paper_objective(mu, np.sqrt(self.weights) * tensions, directions)
 
 
+class _Further(TypedDict, total=False):
+    mu_scaling: Literal["absolute", "weight"]
+    mu_force: float
+    max_rate: float
+    max_thrust: float | list[float] | None
+    max_tilt_deg: float | None
+    weights: float | list[float]
+    settling: float
+    turning: float
+    spread: float
+    barrier: float
+    tolerance: float
+    max_iterations: int
+
+
+class SafeSettings(_Further, total=False):
+    """The settings of :class:`Safe` as keywords, so that a type checker knows their names."""
+
+    mu: float
+    min_angle_deg: float
+    tension_min: float | list[float]
+    tension_max: float | list[float]
+    max_cone_deg: float
+
+
 class SafeAllocator(Allocator):
     """The safe allocator, called by hand; see :class:`Safe` for the settings.
 
     Raises
     ------
-    ValueError
-        For limits that cannot hold together, both by name.
+    SettingError
+        For an unknown setting, a value out of range, or limits that cannot hold together, by name.
 
     Examples
     --------
@@ -405,7 +419,7 @@ class SafeAllocator(Allocator):
         *,
         cone_deg: float = 35.0,
         dt: float = 0.01,
-        **settings: Any,
+        **settings: Unpack[_Further],
     ) -> None:
         part = Safe(
             mu=mu,
@@ -415,11 +429,13 @@ class SafeAllocator(Allocator):
             max_cone_deg=max_cone_deg,
             **settings,
         )
-        if isinstance(n, Team) or n >= 1:
-            problems = part.check(n if isinstance(n, Team) else Team.uniform(n))
-            if problems:
-                raise ValueError("; ".join(f"{name}: {message}" for name, message in problems))
-        super().__init__(part, n, cone_deg=cone_deg, dt=dt)
+        team = n if isinstance(n, Team) else Team.uniform(n)
+        if problems := part.check(team):
+            raise SettingError([Problem(name, "", message) for name, message in problems])
+        super().__init__(part, team, cone_deg=cone_deg, dt=dt)
+
+    def update(self, **settings: Unpack[SafeSettings]) -> None:  # type: ignore[override]
+        super().update(**settings)
 
     @classmethod
     def unchecked(cls, team: Team, part: Safe) -> SafeAllocator:
@@ -459,3 +475,14 @@ class SafeAllocator(Allocator):
             if angle >= enough:
                 break
         return candidate
+
+    def _gap(self) -> Vector:
+        """In the start's cone if that has room, else in a wider one."""
+        most = 0.98 * math.radians(self.part.max_cone_deg)
+        enough = math.cos(math.radians(self.part.min_angle_deg + 1.0))
+        narrow = min(self._cone, most)
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            cable = widest_gap(self._directions, narrow + share * (most - narrow))
+            if float(np.max(self._directions @ cable)) <= enough:
+                break
+        return cable

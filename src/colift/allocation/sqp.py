@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +151,18 @@ class Sqp(AllocatorPart):
         return paper_objective(self.mu, tensions, directions)
 
 
+class _Further(TypedDict, total=False):
+    tolerance: float
+    max_iterations: int
+    transport: bool
+
+
+class SqpSettings(_Further, total=False):
+    """The settings of :class:`Sqp` as keywords, so that a type checker knows their names."""
+
+    mu: float
+
+
 class SqpAllocator(Allocator):
     """The paper's allocator, called by hand; see :class:`Sqp` for the settings.
 
@@ -167,15 +179,13 @@ class SqpAllocator(Allocator):
         n: int | Team,
         mu: float = 0.15,
         *,
-        tolerance: float = 1e-8,
-        max_iterations: int = 50,
-        transport: bool = True,
         cone_deg: float = 35.0,
+        **settings: Unpack[_Further],
     ) -> None:
-        settings = Sqp(
-            mu=mu, tolerance=tolerance, max_iterations=max_iterations, transport=transport
-        )
-        super().__init__(settings, n, cone_deg=cone_deg)
+        super().__init__(Sqp(mu=mu, **settings), n, cone_deg=cone_deg)
+
+    def update(self, **settings: Unpack[SqpSettings]) -> None:  # type: ignore[override]
+        super().update(**settings)
 
     @property
     def mu(self) -> float:

@@ -11,10 +11,10 @@ from pydantic import ValidationError
 from colift.errors import Problem, UnknownNameError
 from colift.fault.base import FaultPart
 from colift.mission.schema import Frame, Section, Timing
-from colift.mission.wording import parse, problems_of, shown
-from colift.part import Part, find
+from colift.part import KIND, Part, find
 from colift.simulation.loop import MAX_DISTURBANCES
 from colift.simulation.signals import columns
+from colift.wording import parse, problems_of, shown
 
 MAX_RECORDING = 4e9
 """Bytes that a flight may record; it is held in memory."""
@@ -155,7 +155,7 @@ def _section_change(
     try:
         present[section] = parse(part, settings)
     except ValidationError as error:
-        for problem in problems_of(error, part, settings, section):
+        for problem in problems_of(error, part, settings, section, KIND):
             yield Problem(path, problem.value, f"{problem.path} {problem.message}")
 
 

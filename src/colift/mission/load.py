@@ -17,8 +17,8 @@ from colift.errors import MissionError, Problem, UnknownNameError
 from colift.mission.checks import cross_checks
 from colift.mission.mission import Mission
 from colift.mission.schema import Frame
-from colift.mission.wording import parse, problems_of, shown
-from colift.part import LAYERS, LISTS, Part, find, names
+from colift.part import FOLDERS, KIND, LAYERS, LISTS, Part, find, names
+from colift.wording import parse, problems_of, shown
 
 DEFAULT_KINDS = {
     "sensing": "ideal",
@@ -204,7 +204,7 @@ def _validate(table: dict[str, Any], problems: list[Problem]) -> Mission | None:
     try:
         frame = parse(Frame, rest)
     except ValidationError as error:
-        mistakes = problems_of(error, Frame, rest)
+        mistakes = problems_of(error, Frame, rest, further=FOLDERS)
         problems.extend(mistakes)
         broken = {problem.path.partition(".")[0] for problem in mistakes}
         intact = {key: value for key, value in rest.items() if key not in broken}
@@ -239,5 +239,5 @@ def _part(layer: str, section: Any, path: str, problems: list[Problem]) -> tuple
     try:
         return str(kind), parse(part, settings)
     except ValidationError as error:
-        problems.extend(problems_of(error, part, settings, path))
+        problems.extend(problems_of(error, part, settings, path, KIND))
         return None

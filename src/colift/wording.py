@@ -1,4 +1,4 @@
-"""Validate plain data and say in plain words what is wrong with it."""
+"""Validate plain data and arguments, and say in plain words what is wrong with them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from colift.errors import Problem
-from colift.mission.schema import Frame
-from colift.part import FOLDERS, Part
+from colift.errors import Problem, SettingError
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -24,13 +24,62 @@ def parse(model: type[Model], table: Mapping[str, Any]) -> Model:
     return model.model_validate_json(json.dumps(table), strict=True)
 
 
+def numbers(
+    name: str,
+    value: Any,
+    shape: tuple[int, ...],
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    finite: bool = True,
+) -> NDArray[np.float64]:
+    """An argument as an array of its own with this shape, each number within the bounds.
+
+    Raises
+    ------
+    SettingError
+        Otherwise; it names the argument.
+
+    """
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        what = f"must be numbers of shape {shape}" if shape else "must be a number"
+        raise SettingError.of(name, shown(value), what) from None
+    if found.shape != shape:
+        what = f"must have shape {shape}" if shape else "must be a single number"
+        raise SettingError.of(name, f"shape {found.shape}", what)
+    bounds = [] if not finite else ["finite"]
+    fits = np.isfinite(found) | (not finite)
+    if above is not None:
+        bounds.append(f"greater than {above:g}")
+        fits &= found > above
+    if least is not None:
+        bounds.append(f"at least {least:g}")
+        fits &= found >= least
+    if below is not None:
+        bounds.append(f"less than {below:g}")
+        fits &= found < below
+    if not fits.all():
+        raise SettingError.of(name, shown(found.tolist()), f"must be {' and '.join(bounds)}")
+    return found
+
+
 def problems_of(
-    error: ValidationError, model: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
+    error: ValidationError,
+    model: type[BaseModel],
+    table: Mapping[str, Any],
+    prefix: str = "",
+    further: Sequence[str] = (),
 ) -> list[Problem]:
-    """One problem a place; of what a union's members say, the most specific."""
+    """One problem a place; of what a union's members say, the most specific.
+
+    ``further`` keys may stand in the table beside the model's fields.
+    """
     found: dict[str, Problem] = {}
     for details in error.errors(include_url=False):
-        problem = _problem(details, model, table, prefix)
+        problem = _problem(details, model, table, prefix, further)
         earlier = found.get(problem.path)
         if earlier and not _is_short(details) and earlier.message != problem.message:
             problem = replace(problem, message=f"{earlier.message}, or {problem.message}")
@@ -54,12 +103,16 @@ _WORDS = {
 
 
 def _problem(
-    details: ErrorDetails, model: type[BaseModel], table: Mapping[str, Any], prefix: str
+    details: ErrorDetails,
+    model: type[BaseModel],
+    table: Mapping[str, Any],
+    prefix: str,
+    further: Sequence[str],
 ) -> Problem:
     location, value = _location(details["loc"], table), shown(details["input"])
-    if details["type"] == "extra_forbidden":
+    if details["type"] in ("extra_forbidden", "no_such_attribute"):
         value = ""
-        valid = _valid_keys(model, location[:-1])
+        valid = _valid_keys(model, location[:-1], further)
         near = difflib.get_close_matches(location[-1], valid, n=1, cutoff=0.5)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         message = f"unknown key{hint} (valid: {', '.join(valid)})"
@@ -92,14 +145,15 @@ def _location(keys: Sequence[int | str], table: Any) -> list[str]:
 
 
 def shown(value: Any) -> str:
+    """A value as a message quotes it."""
     text = repr(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def _valid_keys(model: type[BaseModel], location: list[str]) -> list[str]:
+def _valid_keys(
+    model: type[BaseModel], location: Sequence[str], further: Sequence[str]
+) -> list[str]:
     """Keys that may stand in the table at ``location``."""
-    if model is Frame and not location:
-        return [*Frame.model_fields, *FOLDERS]
     current: Any = model
     for key in location:
         field = current.model_fields.get(key) if hasattr(current, "model_fields") else None
@@ -108,5 +162,4 @@ def _valid_keys(model: type[BaseModel], location: list[str]) -> list[str]:
         annotation = field.annotation
         arguments = getattr(annotation, "__args__", ())
         current = next((a for a in arguments if hasattr(a, "model_fields")), annotation)
-    keys = list(getattr(current, "model_fields", {}))
-    return keys + (["kind"] if isinstance(current, type) and issubclass(current, Part) else [])
+    return [*getattr(current, "model_fields", {}), *(further if not location else ())]
