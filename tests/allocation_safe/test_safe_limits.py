@@ -133,6 +133,51 @@ def test_a_cable_of_more_weight_carries_less():
     assert math.isnan(b.optimality_gap)
 
 
+@pytest.mark.parametrize("weight", [1e-3, 7.0, 1000.0, [0.3, 0.3, 0.3, 0.3]])
+def test_weights_that_are_all_the_same_change_nothing(weight):
+    even, same = SafeAllocator(4), SafeAllocator(4, weights=weight)
+    for force in forces("steps", 0.225 * G, 200):
+        a, b = even.allocate(force), same.allocate(force)
+        np.testing.assert_array_equal(a.tensions, b.tensions)
+        np.testing.assert_array_equal(a.directions, b.directions)
+        assert a.objective == b.objective
+        assert b.objective == pytest.approx(same.part.objective(b.tensions, b.directions), rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [4, 6])
+@pytest.mark.parametrize("ratio", [10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("heavy", [1, 3])
+def test_weights_never_make_a_reachable_force_give_way(n, ratio, heavy):
+    weights = [ratio] * heavy + [1.0] * (n - heavy)
+    allocator = SafeAllocator(team_of(n), min_angle_deg=ANGLE[n], weights=weights)
+    weight, rng = allocator.team.load_mass * G, np.random.default_rng(n)
+    for k in range(500):
+        sway = [2.0 * math.sin(0.019 * k), 2.0 * math.sin(0.014 * k), 0.0]
+        force = weight / G * (sway + 0.3 * rng.standard_normal(3) + [0.0, 0.0, G])
+        answer = allocator.allocate(force)
+        assert answer.status is not Status.FORCE_REDUCED
+    assert answer.tensions[:heavy].max() < 0.5 * answer.tensions[heavy:].min()
+
+
+@pytest.mark.parametrize("barrier", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("n", [4, 8])
+def test_recovering_is_said_only_while_a_limit_is_broken(n, barrier):
+    allocator = make(n, barrier=barrier)
+    rng = np.random.default_rng(n)
+    for level in forces("steps", allocator.team.load_mass * G, 400):
+        force = level + 0.3 * allocator.team.load_mass * rng.standard_normal(3)
+        assert allocator.allocate(force).status is not Status.RECOVERING
+    allocator.reset(directions=np.tile([0.3, 0.1, -1.0], (n, 1)))
+    said = []
+    for _ in range(100):
+        answer = allocator.allocate([0.0, 0.0, allocator.team.load_mass * G])
+        broken = pairwise_angles(answer.directions).min() < math.radians(ANGLE[n])
+        assert (answer.status is Status.RECOVERING) == broken
+        said.append(broken)
+    assert said[0]
+    assert not said[-1]
+
+
 def test_settings_change_between_calls_without_a_jump():
     allocator = SafeAllocator(4)
     for _ in range(50):

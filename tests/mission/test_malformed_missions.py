@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import colift
+from colift.allocation._feasibility import widest_formation
 from colift.errors import ColiftError, MissionError, UnknownNameError
+from colift.geometry import ring
 from colift.mission.load import load_mission, parse_override
 
 NAN, INF = float("nan"), float("inf")
@@ -476,3 +478,26 @@ def test_run_reports_bad_keywords_before_flying(arguments):
 def test_every_error_is_a_colift_error():
     assert issubclass(MissionError, ColiftError)
     assert issubclass(UnknownNameError, ColiftError)
+
+
+EIGHT = {
+    "drones.count": 8, "load.mass": 0.45, "allocation.kind": "safe", "allocation.min_angle_deg": 53.5
+}  # fmt: skip
+"""Eight cables in a cone of 75 degrees are at most 53.9 degrees apart."""
+
+
+def test_a_start_that_cannot_be_led_back_within_the_limits_is_told_before_the_flight():
+    with pytest.raises(MissionError) as error:
+        load_mission(base(), EIGHT | {"start.cone_deg": 20.0})
+    message = str(error.value)
+    for name in ("start.cone_deg", "8 cables", "min_angle_deg = 53.5", "max_cone_deg = 75", "53.9"):
+        assert name in message
+    wide = widest_formation(8, np.radians(75.0))[0]
+    load_mission(base(), EIGHT | {"start.directions": wide.tolist()})
+    ringed = ring(8, np.radians(20.0)).tolist()
+    with pytest.raises(MissionError, match=r"start\.directions: breaks a limit"):
+        load_mission(base(), EIGHT | {"start.directions": ringed})
+
+
+def test_a_start_that_is_led_back_is_no_mistake():
+    load_mission(base(), EIGHT | {"allocation.min_angle_deg": 40.0, "start.cone_deg": 5.0})

@@ -146,7 +146,7 @@ def set_up(  # type: ignore[no-untyped-def]
     for k in range(3 * n):
         alpha[k] = start[k]
     relaxed = False
-    if recovery.is_broken(n, math.cos(params[MIN_ANGLE]), cos_cone, start):
+    if recovery.is_broken(n, math.cos(params[MIN_ANGLE]), cos_cone, recovery.SURE, start):
         relaxed = True
         recovery.lead_back(n, params[MIN_ANGLE], params[CONE], delta, start, alpha)
     for i in range(n):
@@ -202,6 +202,28 @@ def set_up(  # type: ignore[no-untyped-def]
         for k in range(3):
             w[3 * i + k] = t * alpha[3 * i + k]
     return relaxed
+
+
+@inline
+def breaks_a_limit(n, order, unit, params, data, T, alpha):  # type: ignore[no-untyped-def]
+    """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
+    cos_angle, cos_cone = math.cos(params[MIN_ANGLE]), math.cos(params[CONE])
+    if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, alpha):
+        return True
+    if params[LIMITS] > 4.0:
+        cos_tilt = math.cos(params[TILT])
+        for i in range(n):
+            d = newton.DATA * i
+            x = data[d + P] - T[i] * alpha[3 * i]
+            y = data[d + P + 1] - T[i] * alpha[3 * i + 1]
+            z = data[d + P + 2] - T[i] * alpha[3 * i + 2]
+            thrust = math.sqrt(x * x + y * y + z * z)
+            most = params[HEAD + PER_CABLE * order[i] + 4] * unit
+            if thrust > most * (1.0 + recovery.ROUNDING):
+                return True
+            if z < (cos_tilt - recovery.ROUNDING) * thrust:
+                return True
+    return False
 
 
 @inline

@@ -28,20 +28,22 @@ ROOM = 1e-7
 """How much worse (cosine) a broken limit may get in one cycle where nothing gives it way."""
 FIRM = 10.0
 """Largest push between two cables that are too close, in shares of the load."""
-SURE = 1e-9
-"""A limit counts as kept from this margin on."""
+SURE = 1e-12
+"""The iteration can start from this margin of a limit on."""
+ROUNDING = 1e-12
+"""A limit that is missed by no more than this is kept."""
 
 
 @inline
-def is_broken(n, cos_angle, cos_cone, alpha):  # type: ignore[no-untyped-def]
-    """Whether any pair is too close or any cable outside the cone."""
+def is_broken(n, cos_angle, cos_cone, margin, alpha):  # type: ignore[no-untyped-def]
+    """Whether any pair or any cable's place in the cone has no more than a margin (cosine)."""
     for i in range(n):
         x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
-        if not -z - cos_cone > SURE:
+        if not -z - cos_cone > margin:
             return True
         for j in range(i):
             c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
-            if not cos_angle - c > SURE:
+            if not cos_angle - c > margin:
                 return True
     return False
 

@@ -23,7 +23,7 @@ class Status(enum.IntEnum):
     FORCE_REDUCED = 6
     """The limits do not allow the whole force: the nearest allowed one, horizontal part given up first."""
     RECOVERING = 7
-    """The start broke a limit: the cables are on their way back, none worse than it was."""
+    """A limit is broken since the start: the cables are on their way back, none worse than it was."""
     PUSHING = 8
     """A tension came out negative and is shown on the opposite side: a drone below the load."""
     SILENT = 9

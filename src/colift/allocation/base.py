@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from colift.allocation._status import Status as Status
 from colift.errors import Problem, SettingError
-from colift.geometry import ring, widest_gap
+from colift.geometry import Array, ring, widest_gap
 from colift.jit import f8, i8, matrix, vector
 from colift.part import Part
 from colift.team import Team
@@ -74,6 +74,10 @@ class AllocatorPart(Part):
     def cannot_hold(self, team: Team) -> list[str]:
         """Why its limits do not let the team hold the load in hover; empty when they do, or without limits."""
         return []
+
+    def cannot_start(self, team: Team, directions: Array) -> str:
+        """Why the cables (n, 3) cannot be led from there to within its limits; empty when they can."""
+        return ""
 
 
 class Allocation:

@@ -26,7 +26,7 @@ from colift.allocation.base import (
     Status,
 )
 from colift.errors import Problem, SettingError
-from colift.geometry import pairwise_angles, ring, widest_gap
+from colift.geometry import Array, pairwise_angles, ring, widest_gap
 from colift.jit import kernel
 from colift.part import Vector
 from colift.team import Team
@@ -200,7 +200,7 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     info[INFO_GAP] = math.nan
     if W > 1e-6 and mu > 0.0 and params[cycle.EQUAL] != 0.0:
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
-    if relaxed:
+    if relaxed and cycle.breaks_a_limit(n, order, unit, params, data, T, alpha):
         return _RECOVERING
     if balance > 1e-8 * max(1.0, sigma):
         return _FORCE_REDUCED
@@ -215,7 +215,9 @@ Force = Annotated[float, Field(gt=0.0, le=1e6)]
 RATE_BARRIER = 1.0
 """Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
 GIVE_WAY = 20.0
-"""Price of horizontal force, in shares of the load per cable, at which the force gives way."""
+"""Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
+RECOVERY = 5.0
+"""Time in which a start that breaks a limit must be led back, s."""
 VERTICAL_FIRST = 20.0
 """How much dearer vertical force is than horizontal force."""
 
@@ -255,7 +257,7 @@ class Safe(AllocatorPart):
     max_tilt_deg: Degrees | None = None
     """Largest angle between a drone's thrust and the vertical, degrees; none: not limited."""
     weights: Annotated[float, Field(gt=0.0)] | list[Annotated[float, Field(gt=0.0)]] = 1.0
-    """Weight of each cable's squared tension, such as the inverse of a battery's charge."""
+    """Weight of each cable's squared tension, such as the inverse of a battery's charge; only ratios count."""
     settling: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     """Time with which directions settle at the optimum, s; tensions follow at once."""
     turning: Annotated[float, Field(ge=0.0, le=10.0)] = 0.04
@@ -302,6 +304,37 @@ class Safe(AllocatorPart):
     def cannot_hold(self, team: Team) -> list[str]:
         return list(feasible.feasibility(team, self).conflicts)
 
+    def cannot_start(self, team: Team, directions: Array) -> str:
+        if self._keeps_limits(directions):
+            return ""
+        allocator = SafeAllocator.unchecked(team, self)
+        allocator.reset(directions)
+        for _ in range(round(RECOVERY / allocator.dt)):
+            answer = allocator.allocate([0.0, 0.0, team.load_mass * team.gravity])
+            if answer.status is not Status.RECOVERING:
+                return ""
+        polar = np.arccos(np.clip(-answer.directions[:, 2], -1.0, 1.0))
+        apart, widest = (
+            f"{math.degrees(angle):.1f} degrees"
+            for angle in (
+                np.min(pairwise_angles(answer.directions), initial=math.pi),
+                feasible.widest_angle(team.n, math.radians(self.max_cone_deg)),
+            )
+        )
+        return (
+            f"breaks a limit and cannot be led back: after {RECOVERY:g} s of hover the {team.n} cables would "
+            f"be {apart} apart and up to {math.degrees(polar.max()):.1f} degrees from the vertical "
+            f"(allocation.min_angle_deg = {self.min_angle_deg:g}, max_cone_deg = {self.max_cone_deg:g}; "
+            f"the widest formation in that cone has {widest}): start within the limits, with "
+            "start.directions where one ring is too narrow, or ask for less"
+        )
+
+    def _keeps_limits(self, directions: Array) -> bool:
+        """Whether every pair and every cable's place in the cone is as asked."""
+        least, cone = math.radians(self.min_angle_deg), math.radians(self.max_cone_deg)
+        pairs = pairwise_angles(directions)
+        return bool(np.all(pairs > least) and np.all(-directions[:, 2] > math.cos(cone)))
+
     def tension_caps(self, n: int) -> Vector:
         """Largest tension of each cable (n,), N."""
         return np.array(np.broadcast_to(np.asarray(self.tension_max, dtype=float), n))
@@ -326,8 +359,9 @@ class Safe(AllocatorPart):
         head[cycle.MAX_RATE] = self.max_rate
         head[cycle.SETTLING] = self.settling
         head[cycle.TURNING] = self.turning
-        head[cycle.BOUND_H] = GIVE_WAY
-        head[cycle.BOUND_V] = GIVE_WAY * VERTICAL_FIRST
+        weights = self._relative_weights(n)
+        head[cycle.BOUND_H] = GIVE_WAY * float(weights.max())
+        head[cycle.BOUND_V] = head[cycle.BOUND_H] * VERTICAL_FIRST
         head[cycle.TOLERANCE] = self.tolerance
         head[cycle.ITERATIONS] = self.max_iterations
         head[cycle.LIMITS] = newton.LIMITS if limited else newton.TILT - 1
@@ -335,7 +369,6 @@ class Safe(AllocatorPart):
         head[cycle.CONE] = math.radians(self.max_cone_deg)
         head[cycle.TILT] = math.radians(self.max_tilt_deg or 89.0)
         head[cycle.TOTAL] = float(np.sum(self.tension_caps(n)))
-        weights = np.broadcast_to(np.asarray(self.weights, dtype=float), n)
         head[cycle.EQUAL] = bool(np.all(weights == 1.0))
         cables = np.empty((n, cycle.PER_CABLE))
         cables[:, 0] = weights
@@ -344,6 +377,12 @@ class Safe(AllocatorPart):
         cables[:, 3] = team.masses
         cables[:, 4] = 1e6 if self.max_thrust is None else self.max_thrust
         return np.concatenate([head, cables.ravel()])
+
+    def _relative_weights(self, n: int) -> Vector:
+        """Weight of each cable (n,) relative to their mean; ones, exactly, where all are the same."""
+        weights = np.array(np.broadcast_to(np.asarray(self.weights, dtype=float), n))
+        weights /= weights.max()
+        return np.asarray(weights / weights.mean())
 
     def _reach(self, n: int) -> float:
         """Distance beyond the least angle at which a pair is seen, rad: about the second neighbours."""
@@ -362,7 +401,8 @@ class Safe(AllocatorPart):
         mu = self.mu
         if self.mu_scaling == "weight":
             mu *= float(np.sum((tensions @ directions) ** 2)) / self.mu_force**2
-        return paper_objective(mu, np.sqrt(self.weights) * tensions, directions)
+        weights = self._relative_weights(len(tensions))
+        return paper_objective(mu, np.sqrt(weights) * tensions, directions)
 
 
 class _Further(TypedDict, total=False):

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from colift.allocation.base import AllocatorPart
 from colift.errors import Problem, UnknownNameError
 from colift.fault.base import FaultPart
 from colift.mission.schema import Frame, Section, Timing
@@ -62,6 +63,7 @@ def cross_checks(
             team = frame.true_team if part.layer == "plant" else frame.team
             for field, message in part.check(team):
                 yield Problem(f"{path}.{field}", "", message)
+        yield from _start_checks(frame, parts, broken)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
             for field, message in part.check_timing(timing.step, timing.duration):
@@ -77,6 +79,20 @@ def cross_checks(
             yield Problem(f"fault.{i}.at", f"{at:g}", message)
         if "drones" not in broken and drone != "random" and drone >= n:
             yield Problem(f"fault.{i}.drone", str(drone), f"must be one of the drones 0 to {n - 1}")
+
+
+def _start_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> Iterable[Problem]:
+    """A start from which the allocator's limits are never reached, where they can be kept at all."""
+    part, given = parts.get("allocation"), frame.start.directions
+    if not isinstance(part, AllocatorPart) or "start" in broken or part.missing():
+        return
+    drones = frame.first_drones()
+    if (given is None or len(given) == frame.drones.count) and not part.check(frame.team):
+        message = part.of(drones).cannot_start(frame.team.of(drones), frame.start_directions())
+        if message:
+            field = "cone_deg" if given is None else "directions"
+            value = f"{frame.start.cone_deg:g}" if given is None else ""
+            yield Problem(f"start.{field}", value, message)
 
 
 def _criteria_checks(frame: Frame) -> Iterable[Problem]:
