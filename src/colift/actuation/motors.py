@@ -24,8 +24,11 @@ _Y = (1.0, 1.0, -1.0, -1.0)
 _SPIN = (1.0, -1.0, 1.0, -1.0)
 
 _ROUNDING = 1e-9  # N, by which a thrust may miss its limits before the mixer gives something up
-_HEAD = 8  # params before the drones' largest thrusts: lever, ratio, lag, rate, noise, offset (2), least
-_SLOTS = 9  # memory per drone: started, thrust and noise of each motor
+# Params before the drones' largest thrusts: lever, ratio, lag, rate, noise kept and added a tick, offset (2), least.
+_HEAD = 9
+_SLOTS = (
+    9  # memory per drone: 1 + tick of the noise (0: not started), thrust and noise of each motor
+)
 
 
 @inline
@@ -65,32 +68,38 @@ def _turn(  # type: ignore[no-untyped-def]
     step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts, applied_torques
 ):
     n = thrusts.shape[0]
-    lever, ratio, lag, rate, spread = params[0], params[1], params[2], params[3], params[4]
+    lever, ratio, lag, rate = params[0], params[1], params[2], params[3]
     keep = math.exp(-dt / lag) if lag > 0.0 else 0.0
-    kick = spread * math.sqrt(1.0 - keep * keep)
+    now = noise.tick(step, dt)
     for i in range(n):
         o = _SLOTS * i
         wanted = memory[_SLOTS * n + 4 * i : _SLOTS * n + 4 * (i + 1)]
         mix(
-            thrusts[i], torques[i, 0], torques[i, 1], torques[i, 2], lever, ratio, params[7],
+            thrusts[i], torques[i, 0], torques[i, 1], torques[i, 2], lever, ratio, params[8],
             params[_HEAD + i], wanted,
         )  # fmt: skip
+        fresh = memory[o] == 0.0
+        for number in range(now if fresh else int(memory[o]), now + 1):
+            for pair in range(2):
+                kick = noise.normals(key, number, 2 * i + pair)
+                for j in range(2):
+                    N = o + 5 + 2 * pair + j
+                    memory[N] = params[4] * memory[N] + params[5] * kick[j]
+        memory[o] = now + 1
         f = tau_x = tau_y = tau_z = 0.0
         for j in range(4):
             T = memory[o + 1 + j]
-            if memory[o] == 0.0:
+            if fresh:
                 T = wanted[j]
             else:
                 change = (1.0 - keep) * (wanted[j] - T)
                 T += min(max(change, -rate * dt), rate * dt)
             memory[o + 1 + j] = T
-            memory[o + 5 + j] = keep * memory[o + 5 + j] + kick * noise.normal(key, step, 4 * i + j)
             acting = motor_health[i, j] * max(T + memory[o + 5 + j], 0.0)
             f += acting
-            tau_x += (lever * _Y[j] - params[6]) * acting
-            tau_y -= (lever * _X[j] - params[5]) * acting
+            tau_x += (lever * _Y[j] - params[7]) * acting
+            tau_y -= (lever * _X[j] - params[6]) * acting
             tau_z += ratio * _SPIN[j] * acting
-        memory[o] = 1.0
         applied_thrusts[i] = f
         applied_torques[i, 0] = tau_x
         applied_torques[i, 1] = tau_y
@@ -154,7 +163,9 @@ class Motors(ActuationPart):
     def params(self, team: Team) -> Vector:
         lever = self.arm_length / math.sqrt(2.0)
         most = np.broadcast_to(np.asarray(self.max_thrust, dtype=float), team.n)
-        head = [lever, self.torque_ratio, self.time_constant, self.max_rate, self.noise]
+        keep = math.exp(-noise.TICK / self.time_constant) if self.time_constant > 0.0 else 0.0
+        kick = self.noise * math.sqrt(1.0 - keep * keep)
+        head = [lever, self.torque_ratio, self.time_constant, self.max_rate, keep, kick]
         return np.array([*head, *self.centre_offset, self.min_thrust, *most])
 
     def memory(self, team: Team) -> Vector:

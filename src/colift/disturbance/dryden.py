@@ -30,18 +30,16 @@ def scales(height, speed):  # type: ignore[no-untyped-def]
 
 
 @inline
-def first_order(memory, o, x, key, step, channel):  # type: ignore[no-untyped-def]
-    """Advance ``1 / (1 + T s)`` with unit variance by ``x = dt / T``."""
-    keep = math.exp(-x)
-    kick = math.sqrt(-math.expm1(-2.0 * x))
-    memory[o] = keep * memory[o] + kick * noise.normal(key, step, channel)
+def first_order(memory, o, x, a):  # type: ignore[no-untyped-def]
+    """Advance ``1 / (1 + T s)`` with unit variance by ``x = dt / T``, driven by a standard normal."""
+    memory[o] = math.exp(-x) * memory[o] + math.sqrt(-math.expm1(-2.0 * x)) * a
 
 
 @inline
-def second_order(memory, o, x, key, step, channel):  # type: ignore[no-untyped-def]
+def second_order(memory, o, x, a, b):  # type: ignore[no-untyped-def]
     """Advance the states p of ``1 / (1 + T s)`` and q of ``1 / (1 + T s)^2`` by ``x = dt / T``.
 
-    Their stationary variances are 1/2 and 1/4, their covariance 1/4. The noise of a step has the
+    Their stationary variances are 1/2 and 1/4, their covariance 1/4. What two standard normals add has the
     covariances ``int e^-2s``, ``int s e^-2s`` and ``int s^2 e^-2s`` over (0, x).
     """
     keep = math.exp(-x)
@@ -55,7 +53,6 @@ def second_order(memory, o, x, key, step, channel):  # type: ignore[no-untyped-d
         pq = 0.25 - keep2 * (0.5 * x + 0.25)
         qq = 0.25 - keep2 * (0.5 * x * x + 0.5 * x + 0.25)
         rest = max(qq - pq * pq / pp, 0.0)
-    a, b = noise.normal(key, step, channel), noise.normal(key, step, channel + 1)
     root = math.sqrt(pp)
     memory[o + 1] = keep * (memory[o + 1] + x * memory[o]) + pq / root * a + math.sqrt(rest) * b
     memory[o] = keep * memory[o] + root * a
@@ -66,21 +63,26 @@ def _dryden(  # type: ignore[no-untyped-def]
     step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
     attached, params, memory, wind, external,
 ):  # fmt: skip
-    # memory: started; u; p and q of v; p and q of w; each for unit standard deviation
+    # memory: 1 + tick (0: not started); u; p and q of v; p and q of w; each for unit standard deviation
     L_u, L_w, sigma_u, sigma_w = scales(load[0, 2], params[0])
+    now = noise.tick(step, dt)
     if memory[0] == 0.0:
-        memory[0] = 1.0
-        memory[1] = noise.normal(key, step, 8)
+        memory[0] = now
+        memory[1] = noise.normal(key, -1, 0)
         for m in range(2):
-            a, b = noise.normal(key, step, 9 + 2 * m), noise.normal(key, step, 10 + 2 * m)
+            a, b = noise.normals(key, -1, 1 + m)
             memory[2 + 2 * m] = math.sqrt(0.5) * a
             memory[3 + 2 * m] = math.sqrt(0.125) * (a + b)
     x, y, z = wind[0] - load[1, 0], wind[1] - load[1, 1], wind[2] - load[1, 2]
     airspeed = max(math.sqrt(x * x + y * y + z * z), _SLOWEST)
-    along = airspeed * dt / L_u
-    first_order(memory, 1, along, key, step, 0)
-    second_order(memory, 2, along, key, step, 1)
-    second_order(memory, 4, airspeed * dt / L_w, key, step, 3)
+    for number in range(int(memory[0]), now + 1):
+        along = airspeed * noise.TICK / L_u
+        first_order(memory, 1, along, noise.normal(key, number, 0))
+        a, b = noise.normals(key, number, 1)
+        second_order(memory, 2, along, a, b)
+        a, b = noise.normals(key, number, 2)
+        second_order(memory, 4, airspeed * noise.TICK / L_w, a, b)
+    memory[0] = now + 1
     u = sigma_u * memory[1]
     v = sigma_u * (_ROOT3 * memory[2] + (1.0 - _ROOT3) * memory[3])
     w = sigma_w * (_ROOT3 * memory[4] + (1.0 - _ROOT3) * memory[5])
@@ -94,7 +96,8 @@ class Dryden(DisturbancePart):
 
     Scales and intensities follow the load's height, between 3.05 and 305 m (10 and 1000 ft; beyond, those at
     the nearer end). The air is frozen and blows past the load: the airspeed is that of the load against the wind
-    of the parts listed before this one, at least 0.1 m/s. It begins stationary, not calm.
+    of the parts listed before this one, at least 0.1 m/s. It begins stationary, not calm, and changes each
+    millisecond, whatever the physics step.
     """
 
     kernel = _dryden

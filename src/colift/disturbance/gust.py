@@ -28,8 +28,8 @@ def _gust(  # type: ignore[no-untyped-def]
     if interval > 0.0 and since >= 0.0:
         # One gust in each interval, somewhere within it.
         number = int(since / interval)
-        size = noise.uniform(key, number, 0)
-        since -= number * interval + (interval - duration) * noise.uniform(key, number, 1)
+        size, place = noise.uniforms(key, number, 0)
+        since -= number * interval + (interval - duration) * place
     if 0.0 <= since < duration:
         size *= 0.5 * (1.0 - math.cos(2.0 * math.pi * since / duration))
         for k in range(3):

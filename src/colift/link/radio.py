@@ -28,16 +28,19 @@ def _transmit(  # type: ignore[no-untyped-def]
 ):
     slots = int(params[3])
     row = 1 + fifo.size(slots, _WIDTH)
-    due = step % max(1, int(params[0] / dt + 0.5)) == 0
+    every = max(1, int(params[0] / dt + 0.5))
+    due, number = step % every == 0, step // every
     for i in range(tensions.shape[0]):
         o = row * i
         at = -1
         if memory[o] == 0.0:
             memory[o] = 1.0
             at = fifo.post(memory, o + 1, slots, _WIDTH, step)
-        elif due and noise.uniform(key, step, 2 * i) >= params[_HEAD + i]:
-            delay = params[1] + params[2] * noise.uniform(key, step, 2 * i + 1)
-            at = fifo.post(memory, o + 1, slots, _WIDTH, step + int(delay / dt + 0.5))
+        elif due:
+            luck, late = noise.uniforms(key, number, i)
+            if luck >= params[_HEAD + i]:
+                delay = params[1] + params[2] * late
+                at = fifo.post(memory, o + 1, slots, _WIDTH, step + int(delay / dt + 0.5))
         if at >= 0:
             memory[at] = tensions[i]
             for k in range(3):

@@ -24,7 +24,12 @@ Period = Annotated[float, Field(ge=1e-5, le=1.0)]
 
 _SENSORS = {"load": 6, "tracking": 6, "attitude": 4, "rates": 3}  # numbers in one sample
 _QUANTITIES = ("load_position", "load_velocity", "position", "velocity", "attitude", "rates")
-_CHANNELS = 16  # of random numbers per body: 12 of the axes, 4 of dropouts
+_CHANNELS = 16  # of random numbers per body: 0-6 the noise, two axes in each; 7-10 dropouts
+_TURNING, _SPINNING, _LOSING = (
+    3,
+    5,
+    7,
+)  # the first of attitude, rates and dropouts; tracking has 0-2
 
 # params: period, delay, dropout, slots of each sensor; noise, spread of bias, bias (3) of each quantity.
 _SENSOR, _QUANTITY = 4, 5
@@ -33,32 +38,43 @@ _FIRST = _SENSOR * len(_SENSORS)
 
 @inline
 def _place(fresh, step, dt, key, channel, params, sensor, memory, o, width):  # type: ignore[no-untyped-def]
-    """Place for a sample of a sensor, or -1 if none is taken at this step or it is lost.
+    """Place and number of a sensor's sample; the place is -1 if none is taken at this step or it is lost.
 
-    The first sample of all arrives at once: bodies were at rest before.
+    The first sample of all arrives at once: bodies were at rest before. Its number is below -1, that of the bias.
     """
     s = _SENSOR * sensor
-    slots = int(params[s + 3])
+    slots, every = int(params[s + 3]), max(1, int(params[s] / dt + 0.5))
+    number = step // every
     if fresh:
-        return fifo.post(memory, o, slots, width, step)
-    if step % max(1, int(params[s] / dt + 0.5)) != 0:
-        return -1
-    if noise.uniform(key, step, 2 * (channel + 12 + sensor)) < params[s + 2]:
-        return -1
-    return fifo.post(memory, o, slots, width, step + int(params[s + 1] / dt + 0.5))
+        return fifo.post(memory, o, slots, width, step), -2 - number
+    if step % every != 0:
+        return -1, number
+    if (
+        params[s + 2] > 0.0
+        and noise.uniform(key, number, channel + _LOSING + sensor) < params[s + 2]
+    ):
+        return -1, number
+    return fifo.post(memory, o, slots, width, step + int(params[s + 1] / dt + 0.5)), number
 
 
 @inline
-def _draw_bias(key, step, channel, params, quantity, memory, o):  # type: ignore[no-untyped-def]
+def _disturb(memory, at, width, key, number, channel, params, size):  # type: ignore[no-untyped-def]
+    """Add normals to ``width`` numbers, three of each quantity; ``params[size]`` is the first one's deviation."""
+    for c in range((width + 1) // 2):
+        a, b = noise.normals(key, number, channel + c)
+        m = 2 * c
+        memory[at + m] += params[size + _QUANTITY * (m // 3)] * a
+        if m + 1 < width:
+            memory[at + m + 1] += params[size + _QUANTITY * ((m + 1) // 3)] * b
+
+
+@inline
+def _draw_biases(memory, o, width, key, channel, params, quantity):  # type: ignore[no-untyped-def]
+    """The biases of the quantities from the given one on."""
     q = _FIRST + _QUANTITY * quantity
-    for k in range(3):
-        memory[o + k] = params[q + 2 + k] + params[q + 1] * noise.normal(key, step, channel + k)
-
-
-@inline
-def _disturbed(key, step, channel, params, quantity, bias):  # type: ignore[no-untyped-def]
-    """Error of one axis of one sample."""
-    return bias + params[_FIRST + _QUANTITY * quantity] * noise.normal(key, step, channel)
+    for m in range(width):
+        memory[o + m] = params[q + _QUANTITY * (m // 3) + 2 + m % 3]
+    _disturb(memory, o, width, key, -1, channel, params, q + 1)
 
 
 @kernel(SIGNATURE)
@@ -71,14 +87,13 @@ def _sense(  # type: ignore[no-untyped-def]
     fresh = memory[0] == 0.0
     if fresh:
         memory[0] = 1.0
-        for m in range(2):
-            _draw_bias(key, -1, 3 * m, params, m, memory, 1 + 3 * m)
-    at = _place(fresh, step, dt, key, 0, params, 0, memory, 7, 6)
+        _draw_biases(memory, 1, 6, key, 0, params, 0)
+    at, number = _place(fresh, step, dt, key, 0, params, 0, memory, 7, 6)
     if at >= 0:
-        for m in range(2):
-            for k in range(3):
-                c = 3 * m + k
-                memory[at + c] = load[m, k] + _disturbed(key, step, c, params, m, memory[1 + c])
+        for k in range(3):
+            memory[at + k] = load[0, k] + memory[1 + k]
+            memory[at + 3 + k] = load[1, k] + memory[4 + k]
+        _disturb(memory, at, 6, key, number, 0, params, _FIRST)
     at = fifo.fetch(memory, 7, int(params[3]), 6, step)
     if at >= 0 and stuck[n] == 0.0:
         for k in range(3):
@@ -96,30 +111,26 @@ def _sense(  # type: ignore[no-untyped-def]
         fresh = memory[o] == 0.0
         if fresh:
             memory[o] = 1.0
-            for m in range(4):
-                _draw_bias(key, -1, channel + 3 * m, params, 2 + m, memory, o + 1 + 3 * m)
+            _draw_biases(memory, o + 1, 12, key, channel, params, 2)
 
-        at = _place(fresh, step, dt, key, channel, params, 1, memory, o + tracking, 6)
+        at, number = _place(fresh, step, dt, key, channel, params, 1, memory, o + tracking, 6)
         if at >= 0:
             for k in range(3):
-                c = channel + k
-                memory[at + k] = positions[i, k] + _disturbed(
-                    key, step, c, params, 2, memory[o + 1 + k]
-                )
-                memory[at + 3 + k] = velocities[i, k] + _disturbed(
-                    key, step, c + 3, params, 3, memory[o + 4 + k]
-                )
+                memory[at + k] = positions[i, k] + memory[o + 1 + k]
+                memory[at + 3 + k] = velocities[i, k] + memory[o + 4 + k]
+            _disturb(memory, at, 6, key, number, channel, params, _FIRST + 2 * _QUANTITY)
         at = fifo.fetch(memory, o + tracking, int(params[7]), 6, step)
         if at >= 0 and stuck[i] == 0.0:
             for k in range(3):
                 measured_positions[i, k] = memory[at + k]
                 measured_velocities[i, k] = memory[at + 3 + k]
 
-        at = _place(fresh, step, dt, key, channel, params, 2, memory, o + turning, 4)
+        at, number = _place(fresh, step, dt, key, channel, params, 2, memory, o + turning, 4)
         if at >= 0:
-            x = 0.5 * _disturbed(key, step, channel + 6, params, 4, memory[o + 7])
-            y = 0.5 * _disturbed(key, step, channel + 7, params, 4, memory[o + 8])
-            z = 0.5 * _disturbed(key, step, channel + 8, params, 4, memory[o + 9])
+            for k in range(3):
+                memory[at + k] = memory[o + 7 + k]
+            _disturb(memory, at, 3, key, number, channel + _TURNING, params, _FIRST + 4 * _QUANTITY)
+            x, y, z = 0.5 * memory[at], 0.5 * memory[at + 1], 0.5 * memory[at + 2]
             angle = math.sqrt(x * x + y * y + z * z)
             sine = math.sin(angle) / angle if angle > 0.0 else 1.0
             turned = quaternion.multiply(
@@ -133,12 +144,13 @@ def _sense(  # type: ignore[no-untyped-def]
             for k in range(4):
                 measured_attitudes[i, k] = memory[at + k]
 
-        at = _place(fresh, step, dt, key, channel, params, 3, memory, o + spinning, 3)
+        at, number = _place(fresh, step, dt, key, channel, params, 3, memory, o + spinning, 3)
         if at >= 0:
             for k in range(3):
-                memory[at + k] = rates[i, k] + _disturbed(
-                    key, step, channel + 9 + k, params, 5, memory[o + 10 + k]
-                )
+                memory[at + k] = rates[i, k] + memory[o + 10 + k]
+            _disturb(
+                memory, at, 3, key, number, channel + _SPINNING, params, _FIRST + 5 * _QUANTITY
+            )
         at = fifo.fetch(memory, o + spinning, int(params[15]), 3, step)
         if at >= 0 and stuck[i] == 0.0:
             for k in range(3):

@@ -457,9 +457,9 @@ def timetable(mission: Mission) -> list[tuple[int, Event | Change]]:
 
 
 def random_key(seed: int, name: str) -> int:
-    """Key of one part's random numbers (:mod:`colift.math.noise`)."""
+    """Key of one part's random numbers (:mod:`colift.math.noise`): any integer of 64 bits."""
     digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
-    return int.from_bytes(digest[:8], "big") >> 1
+    return int.from_bytes(digest[:8], "big", signed=True)
 
 
 def _due_rows(first: int, stop: int, period: int) -> int:

@@ -1,0 +1,134 @@
+"""What chance does is a function of time: it does not change with the physics step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from air_rig import Air
+from numpy.testing import assert_array_equal
+
+from colift.actuation.motors import Motors
+from colift.disturbance.dryden import Dryden
+from colift.disturbance.gust import Gust
+from colift.link.radio import Radio
+from colift.mission import load_mission
+from colift.sensing.noisy import Noisy
+from colift.simulation.flight import Flight
+from colift.team import Team
+
+STEPS = (0.0005, 0.001, 0.002)
+TIMES = 0.01 * np.arange(101)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [Dryden(speed=8.0), Gust(peak=(4.0, 1.0, 0.0), at=0.1, duration=0.05, every=0.15)],
+    ids=["dryden", "gust"],
+)
+def test_wind(part):
+    histories = []
+    for dt in STEPS:
+        air, every = Air(part, dt=dt), round(0.01 / dt)
+        air.load[0, 2] = 30.0
+        winds = np.array([air.act(k)[0] for k in range(round(1.0 / dt) + 1)])
+        histories.append(winds[::every])
+    assert np.ptp(histories[0], axis=0)[0] > 0.02
+    for other in histories[1:]:
+        np.testing.assert_allclose(other, histories[0], rtol=0.0, atol=1e-10)
+
+
+def test_motors():
+    """Within rounding: thrust less command is the noise alone."""
+    part, histories = Motors(noise=0.05), []
+    for dt in STEPS:
+        memory, params = part.memory(Team.uniform(2)), part.params(Team.uniform(2))
+        rows, thrusts, torques = [], np.zeros(2), np.zeros((2, 3))
+        for k in range(round(1.0 / dt) + 1):
+            Motors.kernel(
+                k, 5, dt, np.full(2, 6.0), np.zeros((2, 3)), np.ones((2, 4)), params, memory,
+                thrusts, torques,
+            )  # fmt: skip
+            rows.append([*thrusts, *torques.ravel()])
+        histories.append(np.array(rows)[:: round(0.01 / dt)])
+    assert histories[0][:, 0].std() > 0.05
+    for other in histories[1:]:
+        np.testing.assert_allclose(other, histories[0], rtol=0.0, atol=1e-13)
+
+
+def test_sensors():
+    """Bias, noise and losses are those of the sample's number."""
+    timing = {"attitude_period": 0.002, "rates_period": 0.004, "rates_dropout": 0.3}
+    part = Noisy(
+        **timing, load_period=0.01, tracking_period=0.01, tracking_dropout=0.2, position_bias=0.01
+    )
+    n, histories = 2, []
+    for dt in STEPS:
+        memory, params = part.memory(Team.uniform(n)), part.params(Team.uniform(n))
+        shapes = [(2, 3), (n, 3), (n, 3), (n, 4), (n, 3)]
+        truth, measured = [np.zeros(s) for s in shapes], [np.zeros(s) for s in shapes]
+        truth[3][:, 0] = 1.0
+        rows = []
+        for k in range(round(1.0 / dt) + 1):
+            Noisy.kernel(k, 11, dt, *truth, np.zeros(n + 1), params, memory, *measured)
+            rows.append(np.concatenate([m.ravel() for m in measured]))
+        histories.append(np.array(rows)[:: round(0.01 / dt)])
+    # Delays of 7 and 1 ms are no multiples of 2 ms: they are rounded to 8 and 2 ms, before the next row.
+    for other in histories[1:]:
+        assert_array_equal(other, histories[0])
+    assert (np.diff(histories[0], axis=0) != 0.0).any(axis=0).all()
+
+
+def test_radio():
+    part, histories = Radio(period=0.01, delay=0.002, jitter=0.004, loss=0.3), []
+    for dt in STEPS:
+        memory, params = part.memory(Team.uniform(2)), part.params(Team.uniform(2))
+        rows, tensions, directions = [], np.zeros(2), np.zeros((2, 3))
+        for k in range(round(1.0 / dt) + 1):
+            wanted = np.full(2, k * dt)
+            Radio.kernel(k, 3, dt, wanted, np.zeros((2, 3)), params, memory, tensions, directions)
+            rows.append(tensions.copy())
+        histories.append(np.array(rows)[:: round(0.01 / dt)])
+    lost = np.diff(histories[0], axis=0) == 0.0
+    assert 0.2 < lost.mean() < 0.4
+    for other in histories[1:]:
+        np.testing.assert_allclose(other, histories[0], atol=1e-12)
+
+
+def mission(step, **changes):
+    table = {
+        "name": "t", "reference": {"kind": "hover"}, "seed": 3,
+        "timing": {
+            "duration": 1.0, "step": step, "recording": 0.01, "load_control": 0.002,
+            "allocation": 0.002, "position_control": 0.002, "attitude_control": 0.002,
+        },
+        "sensing": {
+            "kind": "noisy", "load_delay": 0.008, "tracking_delay": 0.008, "attitude_period": 0.002,
+            "rates_period": 0.002, "rates_delay": 0.002, "load_period": 0.01, "tracking_period": 0.01,
+        },
+        "link": {"kind": "radio", "jitter": 0.0, "delay": 0.004, "loss": 0.1},
+        "actuation": {"kind": "motors", "noise": 0.03},
+        "disturbance": [
+            {"kind": "wind", "speed": 6.0, "ramp": 0.0}, {"kind": "dryden", "speed": 6.0},
+            {"kind": "gust", "every": 0.4, "duration": 0.3, "at": 0.0}, {"kind": "drag"},
+        ],
+    }  # fmt: skip
+    return load_mission(table, changes)
+
+
+def test_a_whole_flight():
+    """The errors of the sensors are the same; the rest differs as the integrator does, in proportion to the step.
+
+    The airspeed, at which turbulence blows past, is the flight's, so the wind differs a little with it.
+    """
+    flights = {step: Flight(mission(step)).run() for step in STEPS}
+    other_seed = Flight(mission(0.001, seed=4)).run()
+    for name, share in (("wind", 2e-3), ("load", 0.1), ("applied_thrusts", 0.1)):
+        fine = flights[0.0005][name]
+        by_chance = np.abs(other_seed[name] - fine).max()
+        by_step = [np.abs(flights[step][name] - fine).max() for step in STEPS[1:]]
+        assert max(by_step) < share * by_chance, name
+    # Sampled every 10 ms, 8 ms late: a row sees the sample of the row before.
+    errors = [f["measured_load"][1:] - f["load"][:-1] for f in flights.values()]
+    for other in errors[1:]:
+        np.testing.assert_allclose(other, errors[0], atol=1e-12)
+    assert errors[0][:, 0].std() > 5e-4
