@@ -55,10 +55,10 @@ def test_logs_of_several_drones_are_put_together(tmp_path: Path) -> None:
 def logs(shift: float, seed: int) -> tuple[Log, Log]:
     random = np.random.default_rng(seed)
     made = []
-    for clock in (0.0, shift):
+    for place, clock in enumerate((0.0, shift)):
         time = np.cumsum(random.uniform(0.008, 0.012, 500))
         load = load_path(time + clock) + random.normal(0.0, 1e-3, (500, 3))
-        drones = {name: np.ones((500, 1, width)) for name, width in DRONE_COLUMNS.items()}
+        drones = {name: np.full((500, 1, w), 1.0 + place) for name, w in DRONE_COLUMNS.items()}
         made.append(Log(time, np.stack([load, load], axis=1), np.zeros((500, 2, 3)), drones))
     return made[0], made[1]
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.markup import escape
 
 from colift.cli.base import Json, app, emit, out
+
+# As in colift.importing.base, which help need not import.
+Frame = Literal["enu", "ned"]
+Unit = Literal["m", "mm"]
+TimeUnit = Literal["s", "ms", "us", "ns"]
+QuaternionOrder = Literal["wxyz", "xyzw"]
 
 
 @app.command(name="import")
@@ -27,6 +33,20 @@ def import_(
         float | None,
         typer.Option(help="Length of a cable, m.", show_default="median distance to the load"),
     ] = None,
+    frame: Annotated[
+        Frame | None,
+        typer.Option(help="Axes of a CSV: z up, or north-east-down.", show_default="enu"),
+    ] = None,
+    unit: Annotated[
+        Unit | None,
+        typer.Option(help="Unit of a CSV's positions and velocities.", show_default="m"),
+    ] = None,
+    time_unit: Annotated[
+        TimeUnit | None, typer.Option(help="Unit of a CSV's times.", show_default="s")
+    ] = None,
+    quaternion: Annotated[
+        QuaternionOrder | None, typer.Option(help="Order of a CSV's columns uavK_q0 to uavK_q3.")
+    ] = None,
     name: Annotated[
         str | None, typer.Option(help="Name of the flight.", show_default="name of the first file")
     ] = None,
@@ -35,17 +55,18 @@ def import_(
     """Turn the logs of a real flight into a recording, for `report` and `judge`.
 
     Reads CSV (see docs/real-flights.md) and the Crazyflie's micro-SD logs, one a drone, whose clocks are
-    aligned by the motion of the load. What was not logged stays unknown.
+    aligned by the motion of the load. What was not logged stays unknown; what cannot be is left out, and said.
 
     [bold]Examples[/bold]
 
       colift import flight.csv --out flight.h5
       colift import cf2_01 cf7_01 --load-mass 0.0098 --out window.h5
+      colift import px4.csv --frame ned --time-unit us
     """
     from pydantic import ValidationError
 
     from colift import metrics
-    from colift.importing import Assumed, import_flight
+    from colift.importing import Assumed, Reading, import_flight
 
     try:
         assumed = Assumed(load_mass=load_mass, drone_mass=drone_mass, cable_length=cable_length)
@@ -53,7 +74,8 @@ def import_(
         first = error.errors()[0]
         option = f"--{first['loc'][0]}".replace("_", "-")
         raise typer.BadParameter(f"{option}: {first['msg']}; found {first['input']}") from None
-    recording = import_flight(files, assumed, name=name)
+    told = Reading(frame=frame, unit=unit, time_unit=time_unit, quaternion=quaternion)
+    recording = import_flight(files, assumed, name=name, told=told)
     path = recording.save(target or Path(f"{files[0].stem}.h5"))
     numbers = {k: v for k, v in metrics.compute(recording).items() if v == v}
     if as_json:
@@ -65,6 +87,7 @@ def import_(
                 "rows": len(recording.time),
                 "cable_lengths_m": recording.mission.team.cable_lengths.tolist(),
                 "metrics": numbers,
+                "findings": recording.provenance["findings"],
                 "provenance": recording.provenance,
                 "file": str(path),
             }
@@ -81,6 +104,10 @@ def import_(
             f"{escape(file['name'])}: clock shifted by {file['clock_offset_s']:+.4f} s; its load lies "
             f"{1e3 * file['load_mismatch_rms_m']:.1f} mm RMS from the first log's",
             highlight=False,
+        )
+    for finding in recording.provenance["findings"]:
+        out.print(
+            f"[yellow]warning[/yellow]: {escape(finding['text'])}", highlight=False, soft_wrap=True
         )
     for key, value in numbers.items():
         out.print(f"{key:>24}  {value:.4g}", highlight=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,8 @@ from pydantic import Field
 
 from colift.errors import FlightDataError
 from colift.importing._clocks import merge
-from colift.importing.base import Array, Log, read
+from colift.importing._plausible import LONGEST, clean, doubt
+from colift.importing.base import Array, Log, Reading, read
 from colift.mission.schema import Drones, Load, RealFlight, Section, Start, Timing
 from colift.recording import Recording, versions
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
@@ -35,7 +37,11 @@ class Assumed(Section):
 
 
 def import_flight(
-    files: Sequence[str | Path], assumed: Assumed | None = None, *, name: str | None = None
+    files: Sequence[str | Path],
+    assumed: Assumed | None = None,
+    *,
+    name: str | None = None,
+    told: Reading | None = None,
 ) -> Recording:
     """One flight from its log, or from several logs that are aligned in time by the load's motion.
 
@@ -44,23 +50,44 @@ def import_flight(
     ``desired_tensions`` and ``desired_directions`` are size and opposite direction of the share that each
     drone's own allocator gave to its cable. ``directions`` point from drone to load, and
     ``direction_rates`` follow from the velocities. Everything else was not measured and is NaN, the
-    actual tensions too.
+    actual tensions too. Rows in which a body cannot be where the log says, or has no position, are NaN; these, drones
+    that were taken for each other and damage of a file stand in ``provenance["findings"]``.
+
+    Parameters
+    ----------
+    files
+        One log of all drones, or one of each.
+    assumed
+        What a log does not tell.
+    name
+        Of the flight; that of the first file where left out.
+    told
+        Conventions that differ from the documented ones, or that are right although they look wrong.
 
     Raises
     ------
     FlightDataError
-        For a file that cannot be read, and for files that are not of one flight.
+        For a file that cannot be read, or that looks as if its frame or a unit were another one; for files that are
+        not of one flight, and for a drone that is given twice.
     OSError
         For a file that cannot be opened.
 
     """
     assumed = assumed or Assumed()
+    told = told or Reading()
     paths = [Path(file) for file in files]
-    found = [read(path) for path in paths]
-    log, offsets = merge([log for _, log in found], [str(path) for path in paths])
+    kinds, logs, drone = [], [], 0
+    for path in paths:
+        kind, log = read(path, told)
+        doubt(str(path), log, told)
+        logs.append(_checked(path, clean(log, [f"drone {drone + i}" for i in range(log.n)])))
+        kinds.append(kind)
+        drone += log.n
+    log, offsets = merge(logs, [str(path) for path in paths])
     if len(log.time) < 2:
         raise FlightDataError(f"{paths[0]}: the logs have no stretch of time in common")
     arrays, spread = _signals(log)
+    findings = sorted(log.findings, key=lambda finding: (finding.kind, finding.begin))
     provenance: dict[str, Any] = {
         "files": [
             {
@@ -70,8 +97,9 @@ def import_flight(
                 "clock_offset_s": shift.seconds,
                 "load_mismatch_rms_m": shift.residual,
             }
-            for path, (kind, _), shift in zip(paths, found, offsets, strict=True)
+            for path, kind, shift in zip(paths, kinds, offsets, strict=True)
         ],
+        "findings": [{**asdict(each), "text": str(each)} for each in findings],
         "importer": f"colift {versions()['colift']}",
         "assumed": assumed.model_dump(exclude_none=True),
         "force": "mean of the drones' own copies",
@@ -84,6 +112,17 @@ def import_flight(
         arrays=arrays,
         provenance=provenance,
     )
+
+
+def _checked(path: Path, log: Log) -> Log:
+    """A log in which load and drones have places, in a time that a flight can last."""
+    for i, values in enumerate([log.load[:, 0], *log.drones["positions"].swapaxes(0, 1)]):
+        if np.count_nonzero(~np.isnan(values).any(axis=1)) < 2:
+            body = f"drone {i - 1}" if i else "the load"
+            raise FlightDataError(f"{path}: has no two rows with a position of {body}")
+    if np.ptp(log.time) > LONGEST:
+        raise FlightDataError(f"{path}: spans {np.ptp(log.time):.3g} s, which is no flight")
+    return log
 
 
 def _signals(log: Log) -> tuple[dict[str, Array], float | None]:
@@ -119,9 +158,11 @@ def _known(
     log: Log, arrays: dict[str, Array], assumed: Assumed, name: str, files: list[str]
 ) -> RealFlight:
     reach = np.linalg.norm(log.load[:, None, 0] - log.drones["positions"], axis=-1)
-    lengths = [round(float(length), 4) for length in np.median(reach, axis=0)]
+    lengths = [round(float(length), 4) for length in np.nanmedian(reach, axis=0)]
     period = max(0.001, round(float(np.median(np.diff(log.time))), 3))
     given = assumed.cable_length
+    directions = arrays["directions"]
+    whole = ~np.isnan(directions).any(axis=(1, 2))
     start = log.load[0, 0] - log.reference[0, 0]
     return RealFlight(
         name=name,
@@ -134,7 +175,7 @@ def _known(
             cable_length=lengths if given is None else given,
         ),
         start=Start(
-            directions=arrays["directions"][0].tolist(),
+            directions=directions[np.argmax(whole)].tolist() if whole.any() else None,
             load_offset=tuple(np.nan_to_num(start).tolist()),
         ),
         timing=Timing(
