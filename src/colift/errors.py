@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 class ColiftError(Exception):
@@ -55,6 +55,12 @@ class SettingError(ColiftError, ValueError):
     def of(cls, path: str, value: object, message: str) -> SettingError:
         """A single mistake."""
         return cls([Problem(path, str(value), message)])
+
+    def within(self, section: str) -> SettingError:
+        """The same mistakes, named as settings of a section."""
+        return SettingError(
+            [replace(each, path=f"{section}.{each.path}".rstrip(".")) for each in self.problems]
+        )
 
 
 class MissionError(ColiftError):

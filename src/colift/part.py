@@ -15,11 +15,11 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Self, cast, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic._internal._model_construction import ModelMetaclass
 
 from colift.errors import ColiftError, SettingError, UnknownNameError
@@ -54,6 +54,7 @@ KIND = ("kind",)
 """Key beside a part's settings in a mission's section."""
 
 
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
 class _PartType(ModelMetaclass):
     """Calling a part's class with settings that it refuses raises an error of ours."""
 
@@ -79,6 +80,8 @@ class Part(BaseModel, metaclass=_PartType):
     kernel: ClassVar[Callable[..., Any]]
     needs: ClassVar[tuple[str, str] | None] = None
     """Package beyond colift's own that the kernel calls, and the extra that installs it."""
+    per_drone: ClassVar[tuple[str, ...]] = ()
+    """Settings that may be a list with one value per drone."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
@@ -87,8 +90,21 @@ class Part(BaseModel, metaclass=_PartType):
             raise SettingError(problems_of(error, type(self), {name: value})) from error
 
     def of(self, drones: Sequence[int]) -> Self:
-        """Settings for the team of these drones; one with values per drone keeps theirs."""
-        return self
+        """Settings for the team of these drones: of values per drone, theirs."""
+        lists = {
+            name: [value[drone] for drone in drones]
+            for name in self.per_drone
+            if isinstance(value := getattr(self, name), list)
+        }
+        return self.model_copy(update=lists) if lists else self
+
+    def wrong_lengths(self, n: int) -> list[tuple[str, str]]:
+        """Lists with one value per drone whose length is not the number of drones, as for :meth:`check`."""
+        return [
+            (name, f"{len(value)} values; must be one value or one for each of {n} drones")
+            for name in self.per_drone
+            if isinstance(value := getattr(self, name), list) and len(value) != n
+        ]
 
     def params(self, team: Team) -> Vector:
         """Parameter vector of the kernel; constant between two calls of the kernel."""
@@ -118,7 +134,7 @@ class Part(BaseModel, metaclass=_PartType):
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""
-        return []
+        return self.wrong_lengths(team.n)
 
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
         """Problems with the physics step or the length of the flight (s), as for :meth:`check`."""
@@ -234,7 +250,11 @@ def make(layer: str, table: Mapping[str, Any]) -> Part:
 
     """
     settings = dict(table)
-    return find(layer, str(settings.pop("kind", "")))(**settings)
+    part = find(layer, str(settings.pop("kind", "")))
+    try:
+        return part(**settings)
+    except SettingError as error:
+        raise error.within(layer) from error
 
 
 def kind_of(part: type[Part]) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -118,6 +117,7 @@ class Motors(ActuationPart):
     """
 
     kernel = _turn
+    per_drone = ("max_thrust",)
 
     arm_length: Annotated[float, Field(gt=0.0, le=5.0)] = 0.2
     """From the centre to a rotor, m."""
@@ -136,17 +136,9 @@ class Motors(ActuationPart):
     centre_offset: tuple[Offset, Offset] = (0.0, 0.0)
     """Centre of gravity from the centre of the rotors, body x and y, m; the mixer is not told."""
 
-    def of(self, drones: Sequence[int]) -> Self:
-        if not isinstance(self.max_thrust, list):
-            return self
-        return self.model_copy(update={"max_thrust": [self.max_thrust[d] for d in drones]})
-
     def check(self, team: Team) -> list[tuple[str, str]]:
-        if isinstance(self.max_thrust, list) and len(self.max_thrust) != team.n:
-            values = f"{len(self.max_thrust)} values"
-            return [
-                ("max_thrust", f"{values}; must be one value or one for each of {team.n} drones")
-            ]
+        if problems := self.wrong_lengths(team.n):
+            return problems
         if self.min_thrust >= np.min(self.max_thrust):
             return [("min_thrust", f"must be below max_thrust = {np.min(self.max_thrust):g} N")]
         spare = 4.0 * np.asarray(self.max_thrust) - team.masses * team.gravity

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from time import perf_counter
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,24 +48,6 @@ class AllocatorPart(Part):
     layer: ClassVar[str] = "allocation"
     spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
     """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
-    per_cable: ClassVar[tuple[str, ...]] = ()
-    """Settings that may be a list with one value per cable."""
-
-    def of(self, drones: Sequence[int]) -> Self:
-        lists = {
-            name: [value[drone] for drone in drones]
-            for name in self.per_cable
-            if isinstance(value := getattr(self, name), list)
-        }
-        return self.model_copy(update=lists) if lists else self
-
-    def wrong_lengths(self, n: int) -> list[tuple[str, str]]:
-        """Lists with one value per cable whose length is not the number of cables, as for :meth:`check`."""
-        return [
-            (name, f"{len(value)} values; must be one value or one for each of {n} drones")
-            for name in self.per_cable
-            if isinstance(value := getattr(self, name), list) and len(value) != n
-        ]
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""

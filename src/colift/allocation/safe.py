@@ -233,7 +233,7 @@ class Safe(AllocatorPart):
 
     kernel = _allocate
     spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
-    per_cable = ("tension_min", "tension_max", "max_thrust", "weights")
+    per_drone = ("tension_min", "tension_max", "max_thrust", "weights")
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""

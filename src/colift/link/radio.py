@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -61,6 +60,7 @@ class Radio(LinkPart):
     """
 
     kernel = _transmit
+    per_drone = ("loss",)
 
     period: Annotated[float, Field(ge=1e-5, le=10.0)] = 0.01
     """Time between two packets to a drone, s; a whole multiple of ``timing.step``."""
@@ -74,17 +74,6 @@ class Radio(LinkPart):
     @property
     def _slots(self) -> int:
         return math.ceil((self.delay + self.jitter) / self.period) + 2
-
-    def of(self, drones: Sequence[int]) -> Self:
-        if not isinstance(self.loss, list):
-            return self
-        return self.model_copy(update={"loss": [self.loss[d] for d in drones]})
-
-    def check(self, team: Team) -> list[tuple[str, str]]:
-        if isinstance(self.loss, list) and len(self.loss) != team.n:
-            values = f"{len(self.loss)} values"
-            return [("loss", f"{values}; must be one value or one for each of {team.n} drones")]
-        return []
 
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
         delays = {"delay": self.delay, "jitter": self.jitter}

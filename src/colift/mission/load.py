@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib.resources
 import json
-import os.path
+import os
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from colift.errors import MissionError, Problem, UnknownNameError
+from colift.errors import MissionError, Problem, SettingError, UnknownNameError
 from colift.mission.checks import cross_checks
 from colift.mission.mission import Mission
 from colift.mission.schema import Frame
@@ -55,6 +55,8 @@ def read_source(source: str | Path) -> tuple[str, dict[str, Any]]:
         If the file cannot be read or is not TOML.
 
     """
+    if not isinstance(source, str | os.PathLike):
+        raise SettingError.of("mission", shown(source), "must be a name, a path or a mapping")
     path = Path(source)
     if path.suffix == ".toml" or os.path.isfile(path):
         label = str(path)
@@ -175,9 +177,14 @@ def _override(table: dict[str, Any], path: str, value: Any, given: set[str]) -> 
 
 def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
     """A copy as tables, lists, numbers, texts and booleans, which is what a mission file can hold."""
-    plain = json.dumps(
-        table, default=lambda value: getattr(value, "tolist", value.__str__)(), ensure_ascii=False
-    )
+    try:
+        plain = json.dumps(
+            table,
+            default=lambda value: getattr(value, "tolist", value.__str__)(),
+            ensure_ascii=False,
+        )
+    except (TypeError, ValueError, RecursionError) as error:
+        raise MissionError("mission", [Problem("", "", f"is not plain data: {error}")]) from error
     return dict(json.loads(plain.encode("utf-8", "replace")))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from colift.allocation.base import INFO_SIZE, AllocatorPart
 from colift.disturbance.base import DisturbancePart
-from colift.errors import ColiftError
+from colift.errors import ColiftError, Problem, SettingError
 from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.mission.mission import Mission
@@ -36,6 +36,7 @@ from colift.simulation.loop import (
 )
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus, columns, make_bus
 from colift.team import Team
+from colift.wording import numbers
 
 Progress = Callable[[float], None]
 """Called with the fraction flown, between 0 and 1."""
@@ -145,8 +146,8 @@ class Flight:
 
         Raises
         ------
-        ValueError
-            Where the part refuses the value (a pydantic ``ValidationError``).
+        SettingError
+            Where the value is refused.
         ColiftError
             For a path that is not there, or a setting that cannot change in flight.
 
@@ -154,14 +155,14 @@ class Flight:
         section, _, name = path.rpartition(".")
         if path == "load.mass":
             leg = self._legs[-1]
-            self._load_mass = float(value)
+            self._load_mass = float(numbers("load.mass", value, (), above=0.0))
             leg.params.plant[:] = self.mission.plant.params(self._true_team(leg.drones))
         elif path == "allocation.kind":
             self.replace("allocation", make("allocation", {"kind": value}))
         elif path in self.parts:
             self.replace(path, make(path.partition(".")[0], value))
         elif section in self.parts:
-            self.replace(section, _with(self.parts[section], name, value))
+            self.replace(section, _with(self.parts[section], section, name, value))
         else:
             raise ColiftError(f"{path}: there is no such setting")
 
@@ -176,6 +177,8 @@ class Flight:
         """
         leg, before = self._legs[-1], self.parts[section]
         same = type(part) is type(before)
+        if problems := part.wrong_lengths(self.mission.team.n):
+            raise SettingError([Problem(name, "", text) for name, text in problems]).within(section)
         packed = part.of(leg.drones).params(leg.team)
         if section.startswith("disturbance."):
             if not same:
@@ -472,9 +475,12 @@ def _places(old: list[int], new: list[int]) -> NDArray[np.int64]:
     return np.array([old.index(drone) if drone in old else -1 for drone in new])
 
 
-def _with(part: AnyPart, name: str, value: Any) -> AnyPart:
+def _with(part: AnyPart, section: str, name: str, value: Any) -> AnyPart:
     """A copy with one setting changed, validated."""
-    return type(part).model_validate({**part.model_dump(), name: value})
+    try:
+        return type(part)(**{**part.model_dump(), name: value})
+    except SettingError as error:
+        raise error.within(section) from error
 
 
 def _refill(vector: Vector, packed: Vector, path: str) -> None:
