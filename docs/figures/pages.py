@@ -1,0 +1,25 @@
+"""What the scripts that write parts of the pages share."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+DOCS = Path(__file__).parents[1]
+
+
+def fill(page: str, name: str, text: str) -> None:
+    """Put text between the marks ``<!-- NAME: ... -->`` and ``<!-- end of NAME -->`` of a page of the documentation."""
+    path = DOCS / page
+    before, found, rest = path.read_text(encoding="utf-8").partition(f"<!-- {name}:")
+    mark, _, rest = rest.partition("-->\n")
+    _, closed, after = rest.partition(f"<!-- end of {name} -->")
+    if not found or not closed:
+        raise SystemExit(f"{path}: no marks of {name}")
+    whole = f"{before}{found}{mark}-->\n\n{text.strip()}\n\n{closed}{after}"
+    path.write_text(whole, encoding="utf-8")
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown."""
+    head = list(header)
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
