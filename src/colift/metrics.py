@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -298,7 +299,13 @@ def detection_delay_s(r: Recording) -> float:
 @_metric("1", "allocations that failed: not the best answer, and no limit to blame")
 def allocator_failures(r: Recording) -> float:
     statuses = r["allocator_status"]
-    return _count(statuses, ~np.isin(statuses, [0, *_WITHIN_LIMITS]))
+    return _count(statuses, ~np.isin(statuses, [0, *_WITHIN_LIMITS, int(Status.SILENT)]))
+
+
+@_metric("1", "cycles in which the allocator did not answer")
+def allocator_silent(r: Recording) -> float:
+    statuses = r["allocator_status"]
+    return _count(statuses, statuses == Status.SILENT)
 
 
 @_metric(
@@ -309,31 +316,45 @@ def allocator_limited(r: Recording) -> float:
     return _count(statuses, np.isin(statuses, _WITHIN_LIMITS))
 
 
+def _answered(r: Recording, name: str) -> NDArray[np.float64]:
+    """What is known of the allocations that answered, by the name of the signal."""
+    values = r[name]
+    return np.asarray(values[~np.isnan(values) & (r["allocator_status"] != Status.SILENT)])
+
+
+def _of_answers(
+    r: Recording, name: str, number: Callable[[NDArray[np.float64]], np.floating[Any]]
+) -> float:
+    """A number of the allocations that answered; NaN where none did."""
+    known = _answered(r, name)
+    return float(number(known)) if known.size else float("nan")
+
+
 @_metric("1", "mean iterations of an allocation")
 def allocator_mean_iterations(r: Recording) -> float:
-    return float(r["allocator_iterations"].mean())
+    return _of_answers(r, "allocator_iterations", np.mean)
 
 
 @_metric("1", "most iterations of an allocation")
 def allocator_max_iterations(r: Recording) -> float:
-    return float(r["allocator_iterations"].max())
+    return _of_answers(r, "allocator_iterations", np.max)
 
 
 @_metric("us", "mean duration of an allocation")
 def allocator_mean_us(r: Recording) -> float:
-    return float(r["allocator_time"].mean() * 1e6)
+    return 1e6 * _of_answers(r, "allocator_time", np.mean)
 
 
 @_metric("us", "median duration of an allocation")
 def allocator_median_us(r: Recording) -> float:
-    return float(np.median(r["allocator_time"]) * 1e6)
+    return 1e6 * _of_answers(r, "allocator_time", np.median)
 
 
 @_metric("us", "99th percentile of the duration of an allocation")
 def allocator_p99_us(r: Recording) -> float:
-    return float(np.percentile(r["allocator_time"], 99) * 1e6)
+    return 1e6 * _of_answers(r, "allocator_time", lambda known: np.percentile(known, 99))
 
 
 @_metric("us", "longest allocation")
 def allocator_max_us(r: Recording) -> float:
-    return float(r["allocator_time"].max() * 1e6)
+    return 1e6 * _of_answers(r, "allocator_time", np.max)

@@ -304,7 +304,7 @@ async def test_a_drone_that_has_left_is_null(web):
     assert len(rows["signals"]["positions"][-1][3]) == 3
     events = [event for m in page.heard if m["type"] == "events" for event in m["events"]]
     events += (await page.next("events"))["events"] if not events else []
-    assert "Cable of drone 3 cut" in {event["text"] for event in events}
+    assert "Cable of drone 2 cut" in {event["text"] for event in events}
 
 
 @on_a_server

@@ -263,7 +263,7 @@ def test_a_flight_that_ends_waits_for_a_reset(start):
     hand.fly(3.0)
     assert hand.session.flight.outcome != "completed"
     assert hand.session.state["paused"]
-    assert any("iverged" in text for text in marks(hand, "fault"))
+    assert any("iverged" in text for text in marks(hand, "outcome"))
     hand.do(lambda s: s.push((1.0, 0.0, 0.0), 0.5))
     assert "reset it" in hand.refusals[0]
     hand.do(lambda s: s.reset(), seconds=0.2)

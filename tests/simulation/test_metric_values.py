@@ -45,16 +45,19 @@ def synthetic(n=4, duration=20.0, period=0.01):
     if n > 1:  # a cable is cut, its drone leaves 0.12 s later
         arrays["attached"][-200:-188, 1] = 0.0
         arrays["attached"][-188:, 1] = np.nan
-    cycles = {s.name: np.zeros(101) for s in CYCLE_SIGNALS}
+    cycles = {s.name: np.zeros(103) for s in CYCLE_SIGNALS}
     cycles["allocator_status"][[3, 70, 90]] = [1.0, 4.0, 6.0]
     cycles["allocator_iterations"][:] = 2.0
     cycles["allocator_iterations"][5] = 12.0
-    cycles["allocator_time"][:] = np.arange(101) * 1e-6
+    cycles["allocator_time"][:] = np.arange(103) * 1e-6
+    for values in cycles.values():  # silent at the end: nothing was measured
+        values[101:] = np.nan
+    cycles["allocator_status"][101:] = 9.0
     mission = load_mission(
         "hover",
         {"drones.count": n, "timing.duration": duration, "actuation.kind": "motors"},
     )
-    cycle_time = np.arange(101) * 0.01
+    cycle_time = np.arange(103) * 0.01
     return Recording(mission=mission, time=time, cycle_time=cycle_time, arrays={**arrays, **cycles})
 
 
@@ -86,6 +89,7 @@ EXPECTED = {
     "lost_drones": 1.0,
     "detection_delay_s": 0.12,
     "allocator_failures": 2.0,
+    "allocator_silent": 2.0,
     "allocator_limited": 1.0,
     "allocator_mean_iterations": 2.0 + 10.0 / 101.0,
     "allocator_max_iterations": 12.0,

@@ -20,12 +20,13 @@ PATIENCE = 120.0
 
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:
-    """Two seconds of a mission, its events early."""
-    events = load_mission(mission).events
-    early = [event.model_dump() | {"at": 1.0 + 0.1 * k} for k, event in enumerate(events)]
-    return colift.run(
-        mission, overrides={"timing.duration": 2.0, "events": early, **settings}
-    ).recording
+    """Two seconds of a mission, its events and faults early."""
+    table = load_mission(mission).resolved()
+    early = {
+        name: [item | {"at": 1.0 + 0.1 * k} for k, item in enumerate(table[name])]
+        for name in ("events", "fault")
+    }
+    return colift.run(mission, overrides={"timing.duration": 2.0, **early, **settings}).recording
 
 
 def payload_of(*recordings: Recording) -> dict[str, Any]:

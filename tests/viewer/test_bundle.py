@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+
+from colift.allocation import Status
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "viewer"
@@ -38,6 +41,16 @@ def test_the_bundle_is_what_the_sources_build(tmp_path: Path) -> None:
         assert fresh.read_bytes() == (ASSETS / fresh.name).read_bytes(), (
             f"{fresh.name} is old; build it: npm run build --prefix viewer"
         )
+
+
+def test_the_page_names_what_the_package_names() -> None:
+    written = runpy.run_path(str(SOURCES / "scripts" / "tables.py"))
+    assert (SOURCES / "src" / "tables.ts").read_text() == written["typescript"](), (
+        "tables.ts is old; write it: python viewer/scripts/tables.py"
+    )
+    statuses = [status.name.replace("_", " ").lower() for status in Status]
+    assert list(Status) == list(range(len(statuses)))
+    assert f"export const STATUS = {json.dumps(statuses, indent=2)};" in written["typescript"]()
 
 
 @built

@@ -81,7 +81,7 @@ def test_buttons_say_what_they_do(server: FakeServer, steering: Opened) -> None:
     steering.click("Push the load for half a second")
     push = server.wait_told(type="do", action="push")
     assert (push["force"], push["seconds"]) == (pytest.approx([1.0, 0.0, 0.0]), 0.5)
-    steering.click("Cut cable 3")
+    steering.click("Cut cable 2")
     server.wait_told(type="do", action="cut", drone=2)
     for title, action in (("Start the flight again", "reset"), ("Save the recording", "save")):
         steering.click(title)

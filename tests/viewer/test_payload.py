@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 from flown import fly, payload_of
 
 from colift import metrics
+from colift.allocation import Status
+from colift.moments import Moment, find_moments
 from colift.recording import Recording
 from colift.viewer.data import BUDGET, RATE, payload
-from colift.viewer.events import find_events
 from colift.viewer.page import live_page, replay_page
 
 
@@ -115,45 +115,24 @@ def test_a_flight_of_one_row_passes(spiral: Recording) -> None:
     assert payload([short], [{}], ["short"])["flights"][0]["time"]["shape"] == [1]
 
 
-def test_events_are_found_with_their_numbers(spiral: Recording) -> None:
-    def slack(times: Any) -> Any:
-        times[:, 1] += np.clip(spiral.time - 0.5, 0.0, 0.2)
-        return times
-
-    def narrow(directions: Any) -> Any:
-        directions[300:320, 1] = directions[300:320, 0]
-        return directions
-
-    def failing(status: Any) -> Any:
-        status[1200:1203] = 4
-        return status
-
-    events = find_events(
-        change(spiral, slack_times=slack, directions=narrow, allocator_status=failing)
-    )
-    found = [(event["kind"], round(event["time"], 3), event["drone"]) for event in events]
-    assert found == [("slack", 0.505, 1), ("fallback", 1.2, None), ("angle", 1.5, None)]
-    assert events[0]["text"] == "Cable 2 slack for 0.2 s"
-    assert events[1]["text"] == "Allocator: numerical failure, 3 cycles"
-    assert "Cables 1 and 2 down to 0.0 deg" in events[2]["text"]
+def test_the_moments_are_those_of_the_flight() -> None:
+    flown = fly("four-to-three")
+    events = payload_of(flown)["flights"][0]["events"]
+    assert [Moment(**event) for event in events] == find_moments(flown)
+    assert {"fault", "departure"} <= {event["kind"] for event in events}
 
 
-@pytest.mark.parametrize(
-    ("mission", "kind", "text"),
-    [
-        ("four-to-three", "fault", "Cable of drone 1 cut"),
-        ("three-to-four", "command", "Drone 4 joins"),
-        ("payload-step", "command", "load.mass = "),
-    ],
-)
-def test_what_the_mission_asks_for_is_an_event(mission: str, kind: str, text: str) -> None:
-    events = [event for event in find_events(fly(mission)) if event["kind"] == kind]
-    assert any(event["text"].startswith(text) and event["time"] == 1.0 for event in events), events
-
-
-def test_a_diverged_flight_ends_in_a_fault(spiral: Recording) -> None:
-    last = find_events(replace(spiral, outcome="diverged before t = 2 s"))[-1]
-    assert (last["kind"], last["text"]) == ("fault", "Diverged before t = 2 s")
+def test_a_silent_cycle_is_silent_and_has_no_solve_time() -> None:
+    silence = {"kind": "allocator-silent", "at": 1.0, "duration": 0.5}
+    flown = fly(fault=[silence])
+    flight = payload_of(flown)["flights"][0]
+    time = unpack(flight["time"], "<f8")
+    status, solve_time = (unpack(flight["signals"][name]) for name in ("status", "solve_time"))
+    during = (time > 1.03) & (time < 1.49)
+    assert (status[during] == Status.SILENT).all()
+    assert np.isnan(solve_time[during]).all()
+    assert (solve_time[time < 1.0] > 0.0).all()
+    assert status[-1] == Status.CONVERGED
 
 
 def test_the_page_allows_its_own_script_and_nothing_else(spiral: Recording) -> None:

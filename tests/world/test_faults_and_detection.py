@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import colift
+from colift.allocation import Status
 from colift.detection.residuals import Residuals
 from colift.fault.base import LOAD
 from colift.fault.battery_low import BatteryLow
@@ -14,6 +15,7 @@ from colift.metrics import compute
 from colift.mission import load_mission
 from colift.reference.descent import Descent
 from colift.simulation.flight import Flight
+from colift.simulation.signals import CYCLE_SIGNALS
 
 AT = 3.0
 REAL = ["ideal", "real"]
@@ -104,6 +106,22 @@ def test_a_silent_allocator_leaves_the_drones_with_what_they_have():
     assert (r["allocator_status"][(r.cycle_time > AT) & (r.cycle_time < AT + 0.29)] == 9).all()
     assert r["allocator_status"][-1] == 0
     assert error(r).max() < 0.05
+
+
+def test_a_silent_cycle_measures_nothing_and_no_metric_takes_it_for_an_answer():
+    fault = {"kind": "allocator-silent", "duration": 3.0}
+    _, r = fly("ideal", fault, duration=AT + 1.5)
+    silent = r["allocator_status"] == Status.SILENT
+    assert silent.mean() > 0.3
+    for name in (s.name for s in CYCLE_SIGNALS if s.name != "allocator_status"):
+        assert np.isnan(r[name][silent]).all(), name
+    numbers, times = compute(r), r["allocator_time"][~silent]
+    assert (times > 0.0).all()
+    assert numbers["allocator_silent"] == silent.sum() == 151
+    assert numbers["allocator_failures"] == 0.0
+    assert numbers["allocator_median_us"] == pytest.approx(1e6 * np.median(times))
+    assert numbers["allocator_mean_us"] == pytest.approx(1e6 * times.mean())
+    assert numbers["allocator_mean_iterations"] >= 1.0
 
 
 def test_a_released_load_falls_freely_and_nobody_is_blamed():

@@ -1,6 +1,14 @@
 // A flight as rows of numbers. Replay fills it at once, live appends to it; everything else only reads.
 
-import type { Mark } from "./events";
+import { MOST_PAIRED, type Kind } from "./tables";
+
+/** A moment of a flight. */
+export interface Mark {
+  time: number;
+  kind: Kind;
+  text: string;
+  drone: number | null;
+}
 
 export interface Packed {
   shape: number[];
@@ -96,9 +104,6 @@ export type Derived = "error" | "angle" | "spin";
 export const SIGNALS = Object.keys(WIDTHS) as Signal[];
 export type Row = Record<Signal, ArrayLike<number>>;
 export type Frame = Record<Signal | Derived, Float32Array> & { time: number; row: number; n: number };
-
-/** Above so many drones no pair of cables is looked at. */
-export const MOST_PAIRED = 64;
 
 export class Flight {
   readonly time = new Column(1, new Float64Array(64));

@@ -4,11 +4,11 @@ import { VIEWS, type View } from "./camera";
 import { Clock } from "./clock";
 import type { Flight, Frame } from "./data";
 import { button, el, format, icon, ICONS } from "./dom";
-import { STATUS } from "./events";
 import { about, eventList, numbers, panel } from "./panel";
 import { plots } from "./plots";
 import type { Shown } from "./scene/element";
 import { Stage } from "./scene/stage";
+import { STATUS } from "./tables";
 import { theme } from "./theme";
 import { Timeline } from "./timeline";
 

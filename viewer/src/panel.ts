@@ -3,7 +3,7 @@
 import type { Clock } from "./clock";
 import type { Flight, Metric } from "./data";
 import { button, el, icon } from "./dom";
-import { KINDS } from "./events";
+import { KINDS } from "./tables";
 
 export interface Tab {
   name: string;
@@ -81,7 +81,7 @@ export function eventList(flights: Flight[], clock: Clock): Part {
           "",
           `Go to ${mark.time.toFixed(2)} s`,
           () => clock.seek(mark.time),
-          el("span", { class: `sign ${mark.kind}` }, icon(KINDS[mark.kind].shape, 12)),
+          el("span", { class: `sign ${KINDS[mark.kind].tone}`, title: KINDS[mark.kind].word }, icon(KINDS[mark.kind].shape, 12)),
           el("time", {}, `${mark.time.toFixed(2)} s`),
           el("span", {}, mark.text, flights.length > 1 ? el("small", {}, flight.info.label) : ""),
         );

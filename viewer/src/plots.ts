@@ -40,7 +40,7 @@ const MANY_PAIRED = 5;
 
 const perDrone = (flight: Flight): Line[] =>
   Array.from({ length: flight.n }, (_, i) => ({
-    label: `${i + 1}`,
+    label: `${i}`,
     ...theme.drone(i),
     width: 1.6,
     values: (row) => flight.columns.tensions.at(row, i),
@@ -48,7 +48,7 @@ const perDrone = (flight: Flight): Line[] =>
 
 const wanted = (flight: Flight): Line[] =>
   Array.from({ length: flight.n }, (_, i) => ({
-    label: `${i + 1} wanted`,
+    label: `${i} wanted`,
     colour: `${theme.drone(i).colour}70`,
     dash: [],
     width: 1,
@@ -63,7 +63,7 @@ const pairs = (flight: Flight): Line[] => {
   for (let i = 0; i < flight.n; i++)
     for (let j = i + 1; j < flight.n; j++)
       lines.push({
-        label: `${i + 1}-${j + 1}`,
+        label: `${i}-${j}`,
         colour: theme.palette.unknown,
         dash: [],
         width: 0.8,

@@ -1,9 +1,9 @@
 // Transport: play, step, speed, and a track to scrub on that carries the events as marks.
 
 import { SPEEDS, type Clock } from "./clock";
-import type { Flight } from "./data";
+import type { Flight, Mark } from "./data";
 import { button, el, icon, ICONS } from "./dom";
-import { KINDS, type Mark } from "./events";
+import { KINDS } from "./tables";
 
 /** Width of a mark, and so the least distance of two, px. */
 const MARK = 18;
@@ -123,11 +123,11 @@ export class Timeline {
     const who = this.flights.length > 1 ? `${flight.info.label}: ` : "";
     const made = button(
       "",
-      `${who}${mark.time.toFixed(2)} s: ${mark.text}`,
+      `${who}${mark.time.toFixed(2)} s, ${KINDS[mark.kind].word}: ${mark.text}`,
       () => this.clock.seek(mark.time),
       icon(KINDS[mark.kind].shape, 12),
     );
-    made.className = `mark ${mark.kind}`;
+    made.className = `mark ${KINDS[mark.kind].tone}`;
     made.style.left = `${place.toFixed(3)}%`;
     made.style.top = `${18 * lane}px`;
     return made;

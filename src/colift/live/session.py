@@ -24,9 +24,9 @@ from colift import metrics
 from colift.errors import ColiftError
 from colift.live import knobs
 from colift.live.endless import flown_mission, live_mission
-from colift.live.watch import Watch, event
 from colift.mission.load import load_mission
 from colift.mission.mission import Mission
+from colift.moments import ONE_COMMAND, Moment, Watch
 from colift.part import kind_of
 from colift.recording import Recording
 from colift.reference.base import ReferencePart
@@ -60,8 +60,6 @@ JUDGED = 5.0
 """Simulated time that they look back, s."""
 MOST_COMMANDS = 20_000
 """Changes of one flight; more are refused."""
-ONE_MARK = 0.5
-"""Changes of the same thing that follow each other within this time are one mark, s."""
 
 
 class Row(NamedTuple):
@@ -274,12 +272,12 @@ class Session:
         """Cut a cable: its drone leaves and the others are told."""
         drones = self.flight.drones
         if drone not in drones:
-            raise ColiftError(f"drone {drone + 1} does not fly")
+            raise ColiftError(f"drone {drone} does not fly")
         if len(drones) == 1:
             raise ColiftError("the last cable cannot be cut")
         self._room()
         self.flight.lose([drone])
-        self._did("drones.lose", drone, f"Cable of drone {drone + 1} cut")
+        self._did("drones.lose", drone, f"Cable of drone {drone} cut")
 
     def target(self, position: Triple) -> None:
         """Fly the load to a point and rest there."""
@@ -329,8 +327,9 @@ class Session:
         if type(flight.parts["allocation"]) is not self._allocator:
             self._see_allocator()
         row = Row(flight.time - self.mission.timing.step, _signals(flight))
-        found = self._watch.look(flight)
-        if self._pending and flight.time - self._pending[1] > ONE_MARK:
+        recent = flight.recording(since=self._watch.seen)
+        found = self._watch.look(recent, [drone for _, drone in flight.found])
+        if self._pending and flight.time - self._pending[1] > ONE_COMMAND:
             self._flush()
         with self._lock:
             self._rows.append(row)
@@ -343,8 +342,8 @@ class Session:
         self.knobs = knobs.knobs_of(self.flight)
         self.generation += 1
 
-    def _mark(self, found: list[dict[str, Any]]) -> None:
-        self._marks.extend(found)
+    def _mark(self, found: list[Moment]) -> None:
+        self._marks.extend(moment._asdict() for moment in found)
         self._marked += len(found)
 
     def _look(self, now: float) -> None:
@@ -411,16 +410,16 @@ class Session:
             self._pending = None
             self._texts.append((time, text))
             with self._lock:
-                self._mark([event(time, "command", text)])
+                self._mark([Moment(time, "command", text)])
 
     def _save(self, recording: Recording) -> None:
         try:
             path = self._write(recording)
         except (ColiftError, OSError) as error:
-            found = event(float(recording.time[-1]), "fault", f"Not saved: {error}")
+            found = Moment(float(recording.time[-1]), "fault", f"Not saved: {error}")
         else:
             self._saved = str(path)
-            found = event(float(recording.time[-1]), "command", f"Saved {path}")
+            found = Moment(float(recording.time[-1]), "command", f"Saved {path}")
         with self._lock:
             self._mark([found])
 
@@ -446,7 +445,8 @@ def _signals(flight: Flight) -> dict[str, Array]:
         found[name] = np.full((n, *values.shape[1:]), np.nan)
         found[name][drones] = values
     allocations = flight.last_allocations
-    worst = allocations.max(axis=0) if len(allocations) else np.full(allocations.shape[1], np.nan)
+    # A silent allocation has no duration; the longest of the others counts.
+    worst = np.fmax.reduce(allocations, axis=0, initial=np.nan)
     found["status"], found["solve_time"] = worst[0], worst[-1]
     found["error"] = np.linalg.norm(found["load"] - found["reference"])
     return found

@@ -255,7 +255,7 @@ def angles(axes: Axes, recording: Recording) -> Array:
         pairs = zip(*np.triu_indices(n, k=1), strict=True)
         degrees = np.degrees(pairwise_angles(flight["directions"]))
         for (i, j), values in zip(pairs, degrees.T, strict=True):
-            line(axes, time, values, label=f"{i + 1}-{j + 1}", **pair(int(i), int(j)))
+            line(axes, time, values, label=f"{i}-{j}", **pair(int(i), int(j)))
     else:
         rows, nearest, widest = nearest_angles(flight["directions"])
         near, wide, time = np.degrees(nearest), np.degrees(widest), time[rows]

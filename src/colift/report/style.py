@@ -118,7 +118,7 @@ def drone(i: int) -> dict[str, Any]:
 
 def drone_label(i: int) -> str:
     """Legend text of drone ``i``; only the first spells the word, to keep the legend short."""
-    return f"drone {i + 1}" if i == 0 else f"{i + 1}"
+    return f"drone {i}" if i == 0 else f"{i}"
 
 
 def series(k: int) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -432,7 +433,8 @@ class _Leg:
         self, begin: int, every: Periods
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rows of the log and allocations due from a step on."""
-        found = [each for each in self.stretches if each.stop > begin]
+        late = takewhile(lambda each: each.stop > begin, reversed(self.stretches))
+        found = list(late)[::-1]
         if not found:
             return np.zeros((0, self.bus.row.size)), np.zeros((0, CYCLE_WIDTH))
         log = np.concatenate([each.log for each in found])

@@ -234,7 +234,8 @@ def advance(  # type: ignore[no-untyped-def]
                 for m in range(INFO_SIZE):
                     cycles[row, 1 + m] = info[m]
                 cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9
-            else:
+            else:  # nothing was asked, so nothing was measured
+                cycles[row, :] = np.nan
                 cycles[row, 0] = _SILENT
 
         transmit(

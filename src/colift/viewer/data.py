@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
 from colift.metrics import all_metrics, compute, tracking_error
+from colift.moments import angle_pairs, find_moments
 from colift.recording import Recording
 from colift.verdict import judge, limits
-from colift.viewer.events import angle_pairs, find_events
 
 Array = NDArray[np.float64]
 
@@ -73,9 +73,9 @@ def _flight(
     recording: Recording, metrics: Mapping[str, float], label: str, budget: float
 ) -> dict[str, Any]:
     mission = recording.mission
-    events = find_events(recording)
+    moments = find_moments(recording)
     signals = _signals(recording)
-    rows = _rows(recording, [event["time"] for event in events], signals, budget)
+    rows = _rows(recording, [moment.time for moment in moments], signals, budget)
     verdict = judge(recording, metrics)
     return {
         "name": mission.name,
@@ -115,7 +115,7 @@ def _flight(
             if metric.name in metrics
         ],
         "mission": tomli_w.dumps(mission.resolved()),
-        "events": events,
+        "events": [moment._asdict() for moment in moments],
         "end": float(recording.time[-1]),
         "time": _packed(recording.time[rows], "<f8"),
         "signals": {
@@ -178,7 +178,7 @@ def _cycles(recording: Recording, rows: NDArray[np.intp]) -> dict[str, Any]:
             begins = np.concatenate([[0], ends[:-1]])
             some = np.flatnonzero(ends > begins)
             values[some] = (
-                np.maximum.reduceat(recording[source][: ends[some[-1]]], begins[some])
+                np.fmax.reduceat(recording[source][: ends[some[-1]]], begins[some])
                 if len(some)
                 else values[some]
             )

@@ -1,6 +1,6 @@
 // The line to the server: it says hello, comes back by itself when lost, and hands on what it hears.
 
-import type { Kind } from "../events";
+import type { Mark } from "../data";
 
 export interface Knob {
   name: string;
@@ -59,7 +59,7 @@ export type Message =
   | State
   | { type: "role"; role: Role }
   | { type: "reset" }
-  | { type: "events"; events: { time: number; kind: Kind; text: string; drone: number | null }[] }
+  | { type: "events"; events: Mark[] }
   | { type: "refused"; reason: string };
 
 export type Line = "connecting" | "open" | "lost";

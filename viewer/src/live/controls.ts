@@ -36,7 +36,7 @@ export class Controls {
     });
     this.target.setAttribute("aria-pressed", "false");
     this.cuts = Array.from({ length: hello.n }, (_, drone) =>
-      button(`${drone + 1}`, `Cut cable ${drone + 1}`, () => send({ type: "do", action: "cut", drone })),
+      button(`${drone}`, `Cut cable ${drone}`, () => send({ type: "do", action: "cut", drone })),
     );
     const act = (label: string, title: string, action: "reset" | "save"): HTMLButtonElement =>
       button(label, title, () => send({ type: "do", action }));

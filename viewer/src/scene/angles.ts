@@ -1,7 +1,8 @@
 // Pairs of cables closer than the safe angle: a filled sector at the load, with the angle written.
 
 import { BufferGeometry, DoubleSide, Float32BufferAttribute, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, Vector3 } from "three";
-import { angleBetween, MOST_PAIRED } from "../data";
+import { angleBetween } from "../data";
+import { MOST_PAIRED } from "../tables";
 import type { Maker } from "./element";
 
 /** Most pairs drawn: the closest. */

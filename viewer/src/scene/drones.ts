@@ -78,7 +78,7 @@ export const drones: Maker = (flight, scale) => {
         });
         if (there && shown.labels && n <= 16) {
           const tension = frame.tensions[i]!;
-          const text = Number.isFinite(tension) ? `${i + 1}  ${tension.toFixed(2)} N` : `${i + 1}`;
+          const text = Number.isFinite(tension) ? `${i}  ${tension.toFixed(2)} N` : `${i}`;
           // Outwards from the load, where neither cable nor arrow is.
           aside.set(frame.positions[3 * i]! - frame.load[0]!, frame.positions[3 * i + 1]! - frame.load[1]!, 0);
           if (aside.lengthSq() > 0) at.addScaledVector(aside.normalize(), 1.9 * scale.drone);

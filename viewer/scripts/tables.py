@@ -1,0 +1,35 @@
+"""Writes viewer/src/tables.ts, what page and package both name: python viewer/scripts/tables.py."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from colift.allocation import Status
+from colift.moments import KINDS, MOST_PAIRED, status_word
+from colift.report.marks import MARKS
+
+TARGET = Path(__file__).parents[1] / "src" / "tables.ts"
+
+
+def typescript() -> str:
+    """The whole file."""
+    statuses = [status_word(code) for code in range(max(Status) + 1)]
+    kinds = {kind: {"word": word, **MARKS[kind]._asdict()} for kind, word in KINDS.items()}
+    return f"""\
+// Written by viewer/scripts/tables.py from the Python package, which has the same; not to be edited here.
+
+/** Words for the allocator's status codes. */
+export const STATUS = {json.dumps(statuses, indent=2)};
+
+/** Kinds of moments: a word, a shape in a box of 12 x 12, and the tone of its colour. */
+export const KINDS = {json.dumps(kinds, indent=2)};
+export type Kind = keyof typeof KINDS;
+
+/** Above so many drones no pair of cables is looked at. */
+export const MOST_PAIRED = {MOST_PAIRED};
+"""
+
+
+if __name__ == "__main__":
+    TARGET.write_text(typescript(), encoding="utf-8", newline="\n")
