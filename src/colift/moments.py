@@ -57,6 +57,7 @@ class Moment(NamedTuple):
 
 def find_moments(recording: Recording) -> list[Moment]:
     """All moments of a flight, in order of time."""
+    recording = recording.complete()  # what was not recorded is not known
     found = [
         Moment(float(each.time[first]), each.kind, each.text(first, last) + each.more(first, last), each.drone)
         for each in _ongoing(recording)
@@ -186,8 +187,8 @@ def _always(text: str) -> Callable[[int, int], str]:
 
 def _known(recording: Recording, name: str) -> Array | None:
     """A signal, unless nothing of it is known."""
-    values = recording.get(name)
-    return None if values is None or np.isnan(values).all() else values
+    values = recording[name]
+    return None if np.isnan(values).all() else values
 
 
 def _faults(recording: Recording) -> Iterator[_Ongoing]:
@@ -231,13 +232,12 @@ def _left(health: Array) -> Callable[[int, int], str]:
 
 
 def _slack(recording: Recording) -> Iterator[_Ongoing]:
-    spent, attached = _known(recording, "slack_times"), recording.get("attached")
+    spent = _known(recording, "slack_times")
     if spent is None or not len(recording.time):
         return
     before = np.zeros((1, recording.n)) if recording.time[0] == 0.0 else spent[:1]
     grown = np.diff(spent, axis=0, prepend=before)
-    if attached is not None:
-        grown[attached == 0.0] = 0.0  # a cable that is cut is not slack
+    grown[recording["attached"] == 0.0] = 0.0  # a cable that is cut is not slack
     for i in np.flatnonzero((grown > 0.0).any(axis=0)).tolist():
 
         def more(first: int, last: int, gained: Array = grown[:, i]) -> str:
@@ -248,13 +248,10 @@ def _slack(recording: Recording) -> Iterator[_Ongoing]:
 
 
 def _fallbacks(recording: Recording) -> Iterator[_Ongoing]:
-    status = recording.get("allocator_status")
-    if status is None:
-        return
-    # Silence is a fault, where the recording tells of faults.
-    told = {Status.CONVERGED} | (
-        {Status.SILENT} if recording.get("allocator_up") is not None else set()
-    )
+    status = recording["allocator_status"]
+    told: set[int] = {Status.CONVERGED}
+    if _known(recording, "allocator_up") is not None:
+        told.add(Status.SILENT)  # told as a fault
     for code in sorted(set(np.unique(status[~np.isnan(status)]).astype(int).tolist()) - told):
         here = status == code
 
@@ -279,12 +276,10 @@ def angle_pairs(n: int) -> bool:
 
 
 def _angles(recording: Recording) -> Iterator[_Ongoing]:
-    limit, directions = limits(recording.mission).angle_deg, recording.get("directions")
-    if limit is None or directions is None or not angle_pairs(recording.n):
+    limit, cut = limits(recording.mission).angle_deg, recording["attached"] == 0.0
+    if limit is None or not angle_pairs(recording.n):
         return
-    attached = recording.get("attached")
-    if attached is not None:  # a cable that is cut makes no angle
-        directions = np.where((attached == 0.0)[..., None], np.nan, directions)
+    directions = np.where(cut[..., None], np.nan, recording["directions"])
     angles = np.degrees(pairwise_angles(directions))
     pairs = list(zip(*np.triu_indices(recording.n, k=1), strict=True))
     lasting = _lasting(recording.time)
@@ -311,7 +306,7 @@ def _gaps(recording: Recording) -> Iterator[_Ongoing]:
     for i in range(recording.n + 1):
         whose, drone = ("Load", None) if i == recording.n else (f"Drone {i}", i)
         values = recording["load"][:, 0] if drone is None else recording["positions"][:, i]
-        lost = np.isnan(values).any(axis=1)
+        lost = np.asarray(np.isnan(values).any(axis=1))
         if not lost.all():
             text = _always(f"{whose} not measured")
             yield _Ongoing(
@@ -397,10 +392,12 @@ def _unseen_faults(recording: Recording) -> Iterator[Moment]:
     """When the mission, or chance, has faults happen."""
     mission = recording.mission
     for number, fault in enumerate(mission.resolved().get("fault", [])):
+        if not isinstance(fault, dict):
+            continue
         at = fault.get("at", "random")
         if at == "random":  # the first number of the stream that colift.fault draws from
             at = np.random.default_rng([mission.seed, number]).uniform(0.0, mission.timing.duration)
-        if at <= recording.time[-1]:
+        if isinstance(at, int | float) and at <= recording.time[-1]:
             kind = str(fault.get("kind", "fault")).replace("-", " ")
             yield Moment(float(at), "fault", f"Fault: {kind}")
 

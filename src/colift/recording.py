@@ -25,6 +25,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,6 +72,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 def versions() -> dict[str, str]:
     """Versions of what produced a result."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
     found = {name: metadata.version(name) for name in ("numpy", "numba", "h5py")}
     try:
         found["colift"] = metadata.version("colift")

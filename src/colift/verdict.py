@@ -221,6 +221,9 @@ def _seen(recording: Recording, values: Mapping[str, float]) -> list[str]:
     failures = values.get("allocator_failures", math.nan)
     if failures > 0:
         found.append(f"{failures:.0f} allocations not ok")
+    silent = values.get("allocator_silent", math.nan)
+    if silent > 0:
+        found.append(f"the allocator was silent in {silent:.0f} cycles")
     reduced = values.get("allocator_limited", math.nan)
     if reduced > 0:
         found.append(f"in {reduced:.0f} allocations the force gave way to limits")

@@ -11,6 +11,7 @@ from colift.errors import ColiftError
 from colift.geometry import pairwise_angles
 from colift.live import session as module
 from colift.live.pilot import Pilot
+from colift.mission.load import load_mission
 from colift.recording import Recording
 from colift.simulation.flight import Flight
 
@@ -341,7 +342,7 @@ def test_a_saved_flight_flies_again_exactly_as_it_was_flown(start, tmp_path):
     ]  # fmt: skip
     times = [time for time, _ in saved.commands]
     assert times == sorted(times)
-    again = Flight(saved.mission).run()
+    again = Flight(load_mission(saved.mission.resolved())).run()
     assert len(again.time) == len(saved.time) > 1000
     for name in ("load", "reference", "tensions", "attitudes", "allocator_iterations"):
         np.testing.assert_array_equal(again[name], saved[name], err_msg=name)
@@ -351,7 +352,7 @@ def test_faults_at_a_random_time_stay_where_they_were_drawn(start):
     hand = start(fault=[{"kind": "cable-cut"}], timing__duration=2.0)
     hand.fly(4.0)
     saved = hand.session.recording()
-    again = Flight(saved.mission).run()
+    again = Flight(load_mission(saved.mission.resolved())).run()
     assert saved.mission.timing.duration > 3.5
     assert saved["attached"].min() == 0.0
     np.testing.assert_array_equal(again["attached"], saved["attached"])

@@ -50,6 +50,8 @@ KEPT_BYTES = 3e8
 """Bytes of the full recording that are kept at most."""
 STEERING_ENDS = 0.5
 """Clock time after which a velocity that is not renewed becomes zero, s."""
+WATCH_PERIOD = 0.1
+"""Simulated time between two looks for what is worth a mark, s."""
 LOOK_PERIOD = 0.1
 """Clock time between two looks at the knobs, s."""
 PACE_PERIOD = 0.5
@@ -327,8 +329,10 @@ class Session:
         if type(flight.parts["allocation"]) is not self._allocator:
             self._see_allocator()
         row = Row(flight.time - self.mission.timing.step, _signals(flight))
-        recent = flight.recording(since=self._watch.seen)
-        found = self._watch.look(recent, [drone for _, drone in flight.found])
+        found: list[Moment] = []
+        if flight.time - self._watch.seen >= WATCH_PERIOD or flight.outcome != "completed":
+            recent = flight.recording(since=self._watch.seen)
+            found = self._watch.look(recent, [drone for _, drone in flight.found])
         if self._pending and flight.time - self._pending[1] > ONE_COMMAND:
             self._flush()
         with self._lock:
