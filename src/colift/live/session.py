@@ -253,7 +253,9 @@ class Session:
         }
         part = knobs.make_allocator(value, kept)
         self._change(
-            "allocation", {"kind": value, **part.model_dump(mode="json")}, f"Allocator {value}"
+            "allocation",
+            {"kind": value, **part.model_dump(mode="json", exclude_none=True)},
+            f"Allocator {value}",
         )
         of_old = [path for path in self._turned if path.startswith("allocation.")]
         for path in of_old:
@@ -388,7 +390,9 @@ class Session:
             raise ColiftError(
                 f"the load is brought down ({self.flight.descent}); reset to fly again"
             )
-        self._change("reference", {"kind": "guided", **part.model_dump(mode="json")}, text)
+        self._change(
+            "reference", {"kind": "guided", **part.model_dump(mode="json", exclude_none=True)}, text
+        )
 
     def _room(self) -> None:
         if self.flight.outcome != "completed":

@@ -57,7 +57,7 @@ class Guided(ReferencePart):
     """When the transition begins, s; before, the reference stands still."""
     start: tuple[Triple, Triple, Triple, Triple] = ((0.0, 0.0, 1.0), _ZERO, _ZERO, _ZERO)
     """Position and three derivatives then, world frame, m, m/s, m/s^2, m/s^3."""
-    target: Triple | None = (1.0, 0.0, 1.5)
+    target: Triple | None = None
     """Where to come to rest, world frame, m; none: fly on at ``velocity``."""
     velocity: Triple = _ZERO
     """Velocity to fly on with when there is no target, world frame, m/s."""
