@@ -11,6 +11,7 @@ import numpy as np
 
 from colift.allocation._oracle import Limits, Oracle, TensionProblem, outcome_of, tension_problem
 from colift.allocation._plain import Outcome, Problem, plain_kernel
+from colift.interrupts import heard
 from colift.part import Vector
 from colift.team import Team
 
@@ -91,11 +92,17 @@ def minimise(
     g_low, g_high = constraint_bounds(n, limits)
     start = {} if multipliers is None else dict(zip(("lam_x0", "lam_g0"), multipliers, strict=True))
     p = [*asked.force, asked.mu, 1.0 / max(1.0, asked.mu)]
-    answer = solver(x0=z, p=p, lbx=low, ubx=high, lbg=g_low, ubg=g_high, **start)
+    with heard():  # CasADi takes an interrupt for a failed evaluation
+        answer = solver(x0=z, p=p, lbx=low, ubx=high, lbg=g_low, ubg=g_high, **start)
     return answer, solver.stats()
 
 
 def _solve(problem: Problem) -> Outcome:
+    with heard():  # also from what is asked of the answer
+        return _answer(problem)
+
+
+def _answer(problem: Problem) -> Outcome:
     asked = tension_problem(problem)
     n, memory = asked.n, problem.memory
     tolerance, most = float(problem.params[1]), int(problem.params[2])

@@ -62,6 +62,10 @@ def main() -> None:
             raise
         err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(EXIT_ERROR)
+    except SystemExit as done:  # which typer makes of an interrupt that no command answers itself
+        if isinstance(getattr(done.__context__, "__cause__", None), KeyboardInterrupt):
+            err.print("interrupted; nothing half-written was left")
+        raise
     except KeyboardInterrupt:
         err.print("interrupted; nothing half-written was left")
         sys.exit(EXIT_INTERRUPTED)

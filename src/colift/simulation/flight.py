@@ -18,6 +18,7 @@ from colift.disturbance.base import DisturbancePart
 from colift.errors import ColiftError, Problem, SettingError
 from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
+from colift.interrupts import heard
 from colift.mission.mission import Mission
 from colift.mission.schema import Event
 from colift.part import LAYERS, Part, Vector, make
@@ -119,10 +120,12 @@ class Flight:
         """
         steps = self.mission.timing.steps
         chunk = max(1, round(CHUNK / self._every.step))
-        while self._step < steps and self.outcome == "completed":
-            self._fly_to(min(steps, (self._step // chunk + 1) * chunk))
-            if progress is not None:
-                progress(self._step / steps)
+        with heard() as interrupted:
+            while self._step < steps and self.outcome == "completed":
+                self._fly_to(min(steps, (self._step // chunk + 1) * chunk))
+                interrupted()
+                if progress is not None:
+                    progress(self._step / steps)
         return self.recording()
 
     def advance(self, duration: float) -> None:
