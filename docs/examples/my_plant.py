@@ -17,12 +17,18 @@ rigid_step = RigidCables.kernel
 
 
 @kernel(STEP_SIGNATURE)
-def step(thrusts, torques, external, attached, dt, params, memory, tensions, slack_times):
+def step(
+    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
+    catch_impulses, slack_times,
+):  # fmt: skip
     n = thrusts.shape[0]
     drag = params[params.shape[0] - 1]
     for k in range(3):  # memory[3:6] is the velocity of the load
         external[n, k] -= drag * memory[3 + k]
-    rigid_step(thrusts, torques, external, attached, dt, params, memory, tensions, slack_times)
+    rigid_step(
+        thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
+        catch_impulses, slack_times,
+    )  # fmt: skip
     for k in range(3):
         external[n, k] = 0.0
 

@@ -222,9 +222,9 @@ def thrust_limits(recording: Recording) -> NDArray[np.float64] | None:
     return None if most is None else np.broadcast_to(np.asarray(most, dtype=float), recording.n)
 
 
-@_metric("N", "largest simultaneous sum of tensions")
+@_metric("N", "largest simultaneous sum of tensions, between recorded rows too")
 def peak_total_tension_N(r: Recording) -> float:
-    return float(_total(r).max())
+    return _largest(r["peak_tensions"][:, -1] if r.measured("peak_tensions") else _total(r))
 
 
 @_metric("N", "time average of the sum of tensions")
@@ -232,9 +232,20 @@ def mean_total_tension_N(r: Recording) -> float:
     return float(mean(_total(r), r.time))
 
 
-@_metric("N", "largest tension of any cable")
+@_metric(
+    "N", "largest tension of any cable, between recorded rows too; without a plastic jerk's impulse"
+)
 def peak_tension_N(r: Recording) -> float:
-    return _largest(r["tensions"])
+    return _largest(r["peak_tensions"][:, :-1] if r.measured("peak_tensions") else r["tensions"])
+
+
+@_metric(
+    "N s",
+    "largest catch: what stops a drone and the load that part with a slack cable's last slack",
+)
+def max_catch_impulse_Ns(r: Recording) -> float:
+    pushed = (r["tensions"] < 0.0).any()  # a rod: what a cable would have caught is not known
+    return float("nan") if pushed else _largest(r["catch_impulses"])
 
 
 @_metric("N s", "sum of tensions integrated over the first 10 s (the paper's J_T)")
@@ -272,6 +283,11 @@ def energy_imbalance(r: Recording) -> float:
 @_metric("s", "time without tension, summed over cables")
 def slack_time_s(r: Recording) -> float:
     return float(sum(_largest(times) for times in r["slack_times"].T))
+
+
+@_metric("s", "time in which motors could not give what was commanded, summed over drones")
+def saturated_time_s(r: Recording) -> float:
+    return float(sum(_largest(times) for times in r["saturated_times"].T))
 
 
 @_metric("m", "least height of the load")

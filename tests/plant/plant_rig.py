@@ -48,6 +48,7 @@ class Rig:
         self.thrusts, self.torques = np.zeros(n), np.zeros((n, 3))
         self.external, self.attached = np.zeros((n + 1, 3)), np.ones(n)
         self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
+        self.peak_tensions, self.catch_impulses = np.zeros(n + 1), np.zeros(n)
 
     def straighten(self):
         """Put beads evenly between drone and load, in motion with them."""
@@ -59,7 +60,8 @@ class Rig:
         for _ in range(count):
             type(self.part).kernel(
                 self.thrusts, self.torques, self.external, self.attached, dt, self.params,
-                self.memory, self.tensions, self.slack_times,
+                self.memory, self.tensions, self.peak_tensions, self.catch_impulses,
+                self.slack_times,
             )  # fmt: skip
         return self
 

@@ -186,7 +186,13 @@ def test_a_shorter_flight_is_the_beginning_of_a_longer_one():
 def test_recording_less_often_picks_rows():
     dense, sparse = fly(**{"timing.recording": 0.001}), fly(**{"timing.recording": 0.01})
     for signal in SIGNALS:
-        np.testing.assert_array_equal(dense[signal.name][::10], sparse[signal.name])
+        rows = dense[signal.name]
+        picked = rows[::10]
+        if signal.name in {"peak_tensions", "catch_impulses"}:  # largest since the row before
+            picked = np.array(
+                [rows[max(0, k - 9) : k + 1].max(axis=0) for k in range(0, len(rows), 10)]
+            )
+        np.testing.assert_array_equal(picked, sparse[signal.name])
 
 
 def test_velocities_are_the_derivatives_of_positions():

@@ -27,6 +27,11 @@ def synthetic(n=4, duration=20.0, period=0.01):
     share = np.arange(1.0, n + 1.0)
     share /= share.sum()
     arrays["tensions"][:] = (1.0 + time)[:, None] * share
+    arrays["peak_tensions"][:, :-1] = arrays["tensions"]
+    arrays["peak_tensions"][:, -1] = 1.0 + time
+    arrays["peak_tensions"][7, 0], arrays["peak_tensions"][8, -1] = 30.0, 40.0  # between rows
+    arrays["catch_impulses"][9, 0] = 0.3
+    arrays["saturated_times"][-1] = 0.25
     arrays["desired_tensions"][:] = arrays["tensions"] - 0.25
     arrays["directions"][:] = ring(n, np.radians(40.0))
     arrays["directions"][rows // 2] = ring(n, np.radians(35.0))
@@ -76,15 +81,17 @@ EXPECTED = {
     "min_cable_distance_m": math.sin(math.radians(neighbour_angle(35.0))),
     "max_tilt_deg": 25.0,
     "peak_thrust_fraction": 0.5,
-    "peak_total_tension_N": 21.0,
+    "peak_total_tension_N": 40.0,
     "mean_total_tension_N": 11.0,
-    "peak_tension_N": 21.0 * 0.4,
+    "peak_tension_N": 30.0,
+    "max_catch_impulse_Ns": 0.3,
     "tension_integral_10s_Ns": 10.0 + 50.0,
     "tension_integral_Ns": 20.0 + 200.0,
     "tension_tracking_rms_N": 0.25,
     "tension_imbalance": 4.0,
     "energy_imbalance": 8.0 / ((8.0 + 3.0) / 4.0),
     "slack_time_s": 2.0,
+    "saturated_time_s": 1.0,
     "min_height_m": 3.0 - 0.04,
     "lost_drones": 1.0,
     "detection_delay_s": 0.12,

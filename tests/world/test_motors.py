@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colift import metrics
+from colift.actuation.ideal import Ideal
 from colift.actuation.motors import Motors, mix
 from colift.errors import MissionError
 from colift.mission import load_mission
+from colift.simulation.flight import Flight
 from colift.team import Team
 
 ARM, RATIO = 0.2, 0.016
@@ -39,12 +42,14 @@ class Rotors:
         self.part, self.n, self.dt, self.key = part, n, dt, key
         self.params, self.memory = part.params(Team.uniform(n)), part.memory(Team.uniform(n))
         self.health = np.ones((n, 4))
+        self.saturated_times = np.zeros(n)
 
     def act(self, f, tau=(0.0, 0.0, 0.0), step=0):
         thrusts, torques = np.zeros(self.n), np.zeros((self.n, 3))
         type(self.part).kernel(
             step, self.key, self.dt, np.full(self.n, float(f)), np.tile(tau, (self.n, 1)) * 1.0,
             self.health, self.params, self.memory, thrusts, torques,
+            self.saturated_times,
         )  # fmt: skip
         return np.column_stack([thrusts, torques])
 
@@ -135,6 +140,40 @@ def test_an_offset_centre_of_gravity_turns_thrust_into_torque():
     found = Rotors(Motors(**IDEAL, centre_offset=(0.01, -0.02))).act(5.0)[0]
     np.testing.assert_allclose(found, effect(np.full(4, 1.25), (0.01, -0.02, 0.0)), atol=1e-12)
     np.testing.assert_allclose(found[1:3], [5.0 * 0.02, 5.0 * 0.01], atol=1e-12)
+
+
+def test_time_at_the_limits_is_counted_for_each_drone():
+    rotors = Rotors(Motors(max_thrust=[3.0, 1.5]), 2)
+    for f, tau in [(6.0, (0.0, 0.0, 0.0)), (6.1, (0.0, 0.0, 0.0)), (1.0, (0.2, 0.0, 0.0))]:
+        rotors.act(
+            f, tau
+        )  # the second drone's 6 N are all it has; 0.2 N m want 0.35 N of each motor
+    np.testing.assert_allclose(rotors.saturated_times, [0.001, 0.002], rtol=1e-12)
+    rotors.act(0.0)
+    rotors.act(-0.1)
+    rotors.act(8.0, (0.0, 0.0, 0.1))  # yaw alone is given up
+    np.testing.assert_allclose(rotors.saturated_times, [0.003, 0.004], rtol=1e-12)
+    ideal = Rotors(Ideal())
+    ideal.act(1e3)
+    assert ideal.saturated_times[0] == 0.0
+
+
+def test_saturation_in_flight_is_counted_and_can_be_a_criterion():
+    """Against the commands of every step, by the inverse of what four motors do."""
+    criteria = {"criteria": {"saturated_time_s": {"max": 0.1}}}
+    settings = {"timing.duration": 1.0, "timing.recording": 0.001, **criteria}
+    recording = Flight(load_mission("noisy-spiral", settings)).run()
+    commands = np.concatenate([recording["thrusts"][..., None], recording["torques"]], axis=2)
+    exact = commands @ np.linalg.inv(np.column_stack([effect(row) for row in np.eye(4)])).T
+    beyond = ((exact < -1e-9) | (exact > 3.0 + 1e-9)).any(axis=2)
+    assert beyond.any(axis=0).all()
+    assert not beyond.all(axis=0).any()
+    counted = 0.001 * np.cumsum(beyond, axis=0)
+    np.testing.assert_allclose(recording["saturated_times"], counted, rtol=0, atol=1e-12)
+    value = metrics.compute(recording)["saturated_time_s"]
+    assert value == pytest.approx(counted[-1].sum())
+    assert value > 0.1
+    assert not recording.mission.criteria["saturated_time_s"].holds(value)
 
 
 def test_default_motors_suit_the_papers_drone():

@@ -7,9 +7,9 @@ from typing import ClassVar
 from colift.jit import f8, i8, matrix, vector, void
 from colift.part import Part
 
-SIGNATURE = void(i8, i8, f8, vector, matrix, matrix, vector, vector, vector, matrix)
+SIGNATURE = void(i8, i8, f8, vector, matrix, matrix, vector, vector, vector, matrix, vector)
 """``kernel(step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts,
-applied_torques)``, called each physics step.
+applied_torques, saturated_times)``, called each physics step.
 
 ================  ======  ==============================================================
 step              int     number of the physics step
@@ -20,6 +20,7 @@ torques           (n, 3)  commands, body frame, N m
 motor_health      (n, 4)  share of its thrust that each motor still gives, 0 to 1
 applied_thrusts   (n,)    out: N
 applied_torques   (n, 3)  out: body frame, N m
+saturated_times   (n,)    in/out: time in which each drone's motors could not give what was commanded, s
 ================  ======  ==============================================================
 """
 

@@ -35,7 +35,8 @@ def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[n
     """Thrusts (4) within ``low`` and ``high`` for a thrust and three torques.
 
     Where not all can be had: roll and pitch keep their ratio and, as far as the motors' range and the wanted thrust
-    allow, their size; thrust is lowered, never raised, to make room for them; yaw takes what is left.
+    allow, their size; thrust is lowered, never raised, to make room for them; yaw takes what is left. Tells whether all
+    can be had.
     """
     yaw = 0.25 * tau_z / ratio
     fits = True
@@ -60,12 +61,14 @@ def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[n
                 share = min(share, max(held - low, 0.0) / -step)
     for j in range(4):
         out[j] = min(max(common + shrink * out[j] + share * _SPIN[j] * yaw, low), high)
+    return fits
 
 
 @kernel(SIGNATURE)
 def _turn(  # type: ignore[no-untyped-def]
-    step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts, applied_torques
-):
+    step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts, applied_torques,
+    saturated_times,
+):  # fmt: skip
     n = thrusts.shape[0]
     lever, ratio, lag, rate = params[0], params[1], params[2], params[3]
     keep = math.exp(-dt / lag) if lag > 0.0 else 0.0
@@ -73,10 +76,12 @@ def _turn(  # type: ignore[no-untyped-def]
     for i in range(n):
         o = _SLOTS * i
         wanted = memory[_SLOTS * n + 4 * i : _SLOTS * n + 4 * (i + 1)]
-        mix(
+        fits = mix(
             thrusts[i], torques[i, 0], torques[i, 1], torques[i, 2], lever, ratio, params[8],
             params[_HEAD + i], wanted,
         )  # fmt: skip
+        if not fits:
+            saturated_times[i] += dt
         fresh = memory[o] == 0.0
         for number in range(now if fresh else int(memory[o]), now + 1):
             for pair in range(2):

@@ -106,6 +106,23 @@ def line(y, o):  # type: ignore[no-untyped-def]
     return 0.0, 0.0, -1.0, d
 
 
+@inline
+def raise_peaks(n, T, peak_tensions):  # type: ignore[no-untyped-def]
+    """Keep the largest tension of each cable and, last, the largest sum of their sizes."""
+    total = 0.0
+    for i in range(n):
+        total += abs(T[i])
+        peak_tensions[i] = max(peak_tensions[i], T[i])
+    peak_tensions[n] = max(peak_tensions[n], total)
+
+
+@inline
+def catch_impulse(i, parting, params):  # type: ignore[no-untyped-def]
+    """Impulse that stops drone ``i`` and the load, parting along the cable at this speed, when nothing else does."""
+    m_L, m = params[0], params[MASS + BODY * i]
+    return parting * m * m_L / (m + m_L)
+
+
 @kernel(OBSERVE_SIGNATURE)
 def observe(  # type: ignore[no-untyped-def]
     params, memory, load, positions, velocities, attitudes, rates, directions, direction_rates

@@ -28,8 +28,11 @@ from colift.plant._bodies import (
     LOAD,
     MASS,
     BodiesPart,
+    catch_impulse,
     free_motion,
+    line,
     normalise,
+    raise_peaks,
     runge_kutta,
     state_size,
 )
@@ -134,10 +137,34 @@ def derivative(n, k, y, thrusts, torques, external, attached, longest, params, T
             a, mass_a = b, mass_b
 
 
+@inline
+def note_catches(n, y, attached, T, params, parting, catch_impulses):  # type: ignore[no-untyped-def]
+    """Keep how fast the ends of each slack cable part (-1 while taut), and the catch when they are its length apart.
+
+    Beads pull a little before that: what counts is the speed before they did.
+    """
+    for i in range(n):
+        if parting[i] < 0.0 and T[i] > 0.0:
+            continue
+        o = LOAD + DRONE * i
+        x, y_, z, d = line(y, o)
+        if attached[i] == 0.0:
+            parting[i] = 0.0
+        elif d > params[MASS + BODY * i + 1]:
+            if parting[i] > 0.0:
+                catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, parting[i], params))
+            parting[i] = -1.0
+        else:
+            along = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
+            free = T[i] == 0.0 or along <= 0.0
+            parting[i] = max(along, 0.0 if free else parting[i])
+
+
 @kernel(STEP_SIGNATURE)
 def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, slack_times
-):
+    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
+    catch_impulses, slack_times,
+):  # fmt: skip
     n = thrusts.shape[0]
     k, longest = int(params[params.shape[0] - 1]), params[params.shape[0] - 2]
     size = LOAD + DRONE * n + BEAD * k * n
@@ -146,6 +173,7 @@ def _step(  # type: ignore[no-untyped-def]
     total = memory[2 * size : 3 * size]
     slope = memory[3 * size : 4 * size]
     T = memory[4 * size : 4 * size + n]
+    parting = memory[4 * size + n : 4 * size + 2 * n]
     substeps = math.ceil(dt / longest)
     h = dt / substeps
     for substep in range(substeps):
@@ -156,6 +184,8 @@ def _step(  # type: ignore[no-untyped-def]
             runge_kutta(stage, size, h, begin, slope, total, y)
             if stage > 0:
                 continue
+            raise_peaks(n, T, peak_tensions)
+            note_catches(n, begin, attached, T, params, parting, catch_impulses)
             for i in range(n):
                 if substep == 0:
                     tensions[i] = T[i]
@@ -231,7 +261,7 @@ class ChainPart(BodiesPart):
         return np.concatenate([super().params(loaded), cables.ravel(), tail])
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * (state_size(team.n) + BEAD * self.bead_count * team.n) + team.n)
+        return np.zeros(4 * (state_size(team.n) + BEAD * self.bead_count * team.n) + 2 * team.n)
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(team.cable_lengths * (1.0 + tensions / self.stiffness))
@@ -273,4 +303,4 @@ class ChainPart(BodiesPart):
 
 def _team_size(memory: Vector, width: int) -> int:
     """Drones whose memory this is, with ``width`` numbers for the beads of each."""
-    return (memory.size - 4 * LOAD) // (4 * (DRONE + width) + 1)
+    return (memory.size - 4 * LOAD) // (4 * (DRONE + width) + 2)

@@ -33,18 +33,26 @@ direction_rates   (n, 3)  out: their time derivatives, 1/s
 ================  ======  ======================================================
 """
 
-STEP_SIGNATURE = void(vector, matrix, matrix, vector, f8, vector, vector, vector, vector)
-"""``step(thrusts, torques, external, attached, dt, params, memory, tensions, slack_times)``.
+STEP_SIGNATURE = void(
+    vector, matrix, matrix, vector, f8, vector, vector, vector, vector, vector, vector
+)  # fmt: skip
+"""``step(thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions, catch_impulses,
+slack_times)``.
 
-============  ==========  ========================================================
-thrusts       (n,)        along the body z axes, N
-torques       (n, 3)      body frame, N m
-external      (n + 1, 3)  further forces on the drones and, last row, the load, world, N
-attached      (n,)        1 while the cable holds, 0 from when it is cut: no tension, the drone flies free
-dt            float       physics step, s
-tensions      (n,)        out: at the beginning of the step, N
-slack_times   (n,)        in/out: time that each cable, while attached, has spent without tension, s
-============  ==========  ========================================================
+==============  ==========  ========================================================
+thrusts         (n,)        along the body z axes, N
+torques         (n, 3)      body frame, N m
+external        (n + 1, 3)  further forces on the drones and, last row, the load, world, N
+attached        (n,)        1 while the cable holds, 0 from when it is cut: no tension, the drone flies free
+dt              float       physics step, s
+tensions        (n,)        out: at the beginning of the step, N
+peak_tensions   (n + 1,)    in/out: raised to the largest tension of each cable and, last, the largest sum of them, N
+catch_impulses  (n,)        in/out: raised to the largest impulse with which each cable came taut, N s
+slack_times     (n,)        in/out: time that each cable, while attached, has spent without tension, s
+==============  ==========  ========================================================
+
+A cable that comes taut while its ends part with speed ``u`` has a catch of impulse ``u / (1 / m_i + 1 / m_L)``: what stops
+drone and load, were nothing else to hold them. The loop sets peaks and impulses to zero after each recorded row.
 """
 
 

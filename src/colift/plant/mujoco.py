@@ -79,13 +79,14 @@ def _scene(params: bytes) -> _Scene:
 
 
 def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, slack_times
-):
+    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
+    catch_impulses, slack_times,
+):  # fmt: skip
     import mujoco
 
     scene = _scene(params.tobytes())
     model, data, n = scene.model, scene.data, thrusts.shape[0]
-    state, warm_start = memory[: state_size(n)], memory[state_size(n) :]
+    state, warm_start, parting = np.split(memory, [state_size(n), memory.size - n])
     if not all(np.abs(a).max() < mujoco.mjMAXVAL for a in (thrusts, torques, external, state)):
         state[:] = np.nan  # MuJoCo would go on with other numbers; a flight that diverges shall end
         return
@@ -101,12 +102,19 @@ def _step(  # type: ignore[no-untyped-def]
     controls[:, 1:] = torques
     data.xfrc_applied[1, :3] = external[n]
     data.xfrc_applied[2:, :3] = external[:n]
-    mujoco.mj_forward(model, data)
-    limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
-    tensions[:] = 0.0
-    tensions[data.efc_id[limits]] = data.efc_force[limits]
-    slack_times[(tensions == 0.0) & (attached > 0.0)] += dt
-    for _ in range(substeps):
+    reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
+    for substep in range(substeps):
+        mujoco.mj_forward(model, data)
+        limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
+        pulls = np.zeros(n)
+        pulls[data.efc_id[limits]] = data.efc_force[limits]
+        if substep == 0:
+            tensions[:] = pulls
+        np.maximum(peak_tensions, np.append(pulls, pulls.sum()), out=peak_tensions)
+        slack_times[(pulls == 0.0) & (attached > 0.0)] += dt / substeps
+        holds, taut = attached > 0.0, data.ten_length > model.tendon_range[:, 1]
+        np.maximum(catch_impulses, reduced * parting, out=catch_impulses, where=holds & taut)
+        parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity, 0.0), 0.0)
         mujoco.mj_step(model, data)
     state[scene.qpos] = data.qpos
     state[scene.qvel] = data.qvel
@@ -141,4 +149,4 @@ class Mujoco(BodiesPart):
         return np.append(super().params(team), settings)
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(state_size(team.n) + 3 + 6 * team.n)
+        return np.zeros(state_size(team.n) + 3 + 7 * team.n)

@@ -1,7 +1,7 @@
 """Quadrotors on rigid massless cables under a point load (paper eqs. 1 to 5), RK4 with projection.
 
 The equations are in :mod:`colift.plant._rigid`. A tension may come out negative: a rigid rod would push. That
-time is counted as slack.
+time is counted as slack; a rod is never caught.
 """
 
 from __future__ import annotations
@@ -10,7 +10,14 @@ import numpy as np
 
 from colift.jit import kernel
 from colift.part import Vector
-from colift.plant._bodies import DRONE, LOAD, BodiesPart, runge_kutta, state_size
+from colift.plant._bodies import (
+    DRONE,
+    LOAD,
+    BodiesPart,
+    raise_peaks,
+    runge_kutta,
+    state_size,
+)
 from colift.plant._rigid import derivative, project
 from colift.plant.base import STEP_SIGNATURE
 from colift.team import Team
@@ -18,8 +25,9 @@ from colift.team import Team
 
 @kernel(STEP_SIGNATURE)
 def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, slack_times
-):
+    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
+    catch_impulses, slack_times,
+):  # fmt: skip
     n = thrusts.shape[0]
     size = LOAD + DRONE * n
     y = memory[:size]
@@ -37,6 +45,7 @@ def _step(  # type: ignore[no-untyped-def]
         if stage == 0:
             for i in range(n):
                 tensions[i] = T[i]
+            raise_peaks(n, T, peak_tensions)
     project(n, y, attached, params, T, alpha, b)
     for i in range(n):
         if tensions[i] < 0.0:

@@ -22,8 +22,10 @@ from colift.plant._bodies import (
     LOAD,
     MASS,
     BodiesPart,
+    catch_impulse,
     free_motion,
     line,
+    raise_peaks,
     runge_kutta,
     state_size,
 )
@@ -79,7 +81,7 @@ def complementarity(n, alpha, b, taut, params, held, T):  # type: ignore[no-unty
 
 
 @inline
-def catch(n, y, attached, slow, params, taut, held, T, alpha, b):  # type: ignore[no-untyped-def]
+def catch(n, y, attached, slow, params, taut, held, T, alpha, b, catch_impulses):  # type: ignore[no-untyped-def]
     """Find the taut cables, those at full length that shorten at most ``slow``; impulses stop any that grow."""
     lines(n, y, alpha, b)
     beyond = False
@@ -93,7 +95,9 @@ def catch(n, y, attached, slow, params, taut, held, T, alpha, b):  # type: ignor
     closing(n, y, alpha, b)
     jerk = False
     for i in range(n):
-        jerk = jerk or (taut[i] > 0.0 and b[i] > SLOW)
+        if taut[i] > 0.0 and b[i] > SLOW:
+            jerk = True
+            catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, b[i], params))
     if jerk:
         complementarity(n, alpha, b, taut, params, held, T)
         pull(n, alpha, T, params, 3, y)
@@ -105,8 +109,9 @@ def catch(n, y, attached, slow, params, taut, held, T, alpha, b):  # type: ignor
 
 @kernel(STEP_SIGNATURE)
 def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, slack_times
-):
+    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
+    catch_impulses, slack_times,
+):  # fmt: skip
     n = thrusts.shape[0]
     size = LOAD + DRONE * n
     y = memory[:size]
@@ -120,11 +125,12 @@ def _step(  # type: ignore[no-untyped-def]
     for event in range(EVENTS * n + 1):
         last = event == EVENTS * n
         slow = math.inf if last else SLOW
-        catch(n, y, attached, slow, params, taut, held, T, alpha, b)
+        catch(n, y, attached, slow, params, taut, held, T, alpha, b, catch_impulses)
         free_motion(n, y, thrusts, torques, external, params, slope)
         lines(n, y, alpha, b)
         demand(n, y, slope, alpha, b)
         complementarity(n, alpha, b, taut, params, held, T)
+        raise_peaks(n, T, peak_tensions)
         if event == 0:
             for i in range(n):
                 tensions[i] = T[i]

@@ -267,7 +267,7 @@ def advance(  # type: ignore[no-untyped-def]
 
         actuate(
             k, keys.actuation, dt, bus.thrusts, bus.torques, bus.motor_health, params.actuation,
-            memory.actuation, bus.applied_thrusts, bus.applied_torques,
+            memory.actuation, bus.applied_thrusts, bus.applied_torques, bus.saturated_times,
         )  # fmt: skip
         bus.wind[:] = 0.0
         bus.external_forces[:] = 0.0
@@ -280,11 +280,14 @@ def advance(  # type: ignore[no-untyped-def]
             )  # fmt: skip
         step(
             bus.applied_thrusts, bus.applied_torques, bus.external_forces, bus.attached, dt,
-            params.plant, memory.plant, bus.tensions, bus.slack_times,
+            params.plant, memory.plant, bus.tensions, bus.peak_tensions, bus.catch_impulses,
+            bus.slack_times,
         )  # fmt: skip
 
         if k % every.recording == 0:
             log[k // every.recording - first_row, :] = bus.row
+            bus.peak_tensions[:] = 0.0
+            bus.catch_impulses[:] = 0.0
         for i in range(n):
             if bus.carrying[i] == 0.0:
                 return k + 1

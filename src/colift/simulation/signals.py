@@ -43,6 +43,8 @@ SIGNALS = (
     Signal("desired_tensions", ("n",), "N", "T_id", "-", "tensions wanted by the allocator"),
     Signal("desired_directions", ("n", 3), "1", "alpha_id", "world", "unit directions drone to load wanted by the allocator"),
     Signal("tensions", ("n",), "N", "T_i", "-", "actual tensions"),
+    Signal("peak_tensions", ("n+1",), "N", "-", "-", "largest tension of each cable and, last, largest sum of them since the row before"),
+    Signal("catch_impulses", ("n",), "N s", "-", "-", "largest impulse with which each cable came taut since the row before"),
     Signal("directions", ("n", 3), "1", "alpha_i", "world", "actual unit directions from drone to load"),
     Signal("direction_rates", ("n", 3), "1/s", "alpha_dot_i", "world", "time derivatives of the directions"),
     Signal("positions", ("n", 3), "m", "x_i", "world", "drone positions"),
@@ -71,6 +73,7 @@ SIGNALS = (
     Signal("received_directions", ("n", 3), "1", "-", "world", "wanted directions that have reached the drones"),
     Signal("applied_thrusts", ("n",), "N", "-", "-", "thrusts that act"),
     Signal("applied_torques", ("n", 3), "N m", "-", "body", "torques that act"),
+    Signal("saturated_times", ("n",), "s", "-", "-", "time in which each drone's motors could not give what was commanded"),
     Signal("wind", (3,), "m/s", "-", "world", "velocity of the air"),
     Signal("carrying", ("n",), "1", "-", "-", "1 for a drone that is taken to carry, 0 once it is judged lost", initial=1.0),
     Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives", initial=1.0),
@@ -111,6 +114,8 @@ class Bus(NamedTuple):
     desired_tensions: Array
     desired_directions: Array
     tensions: Array
+    peak_tensions: Array
+    catch_impulses: Array
     directions: Array
     direction_rates: Array
     positions: Array
@@ -139,6 +144,7 @@ class Bus(NamedTuple):
     received_directions: Array
     applied_thrusts: Array
     applied_torques: Array
+    saturated_times: Array
     wind: Array
     carrying: Array
     motor_health: Array
