@@ -58,9 +58,9 @@ def main() -> None:
         err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
         sys.exit(EXIT_ERROR)
     except OSError as error:
-        if error.filename is None:
-            raise
-        err.print(f"[red]error[/red]: {escape(str(error))}", highlight=False, soft_wrap=True)
+        said = error.strerror or str(error) or type(error).__name__
+        where = "" if error.filename is None else f"{error.filename}: "
+        err.print(f"[red]error[/red]: {escape(where + said)}", highlight=False, soft_wrap=True)
         sys.exit(EXIT_ERROR)
     except SystemExit as done:  # which typer makes of an interrupt that no command answers itself
         if isinstance(getattr(done.__context__, "__cause__", None), KeyboardInterrupt):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
@@ -16,6 +16,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+
+from colift.errors import ColiftError
 
 if TYPE_CHECKING:
     from colift.simulation.flight import Progress as Report
@@ -62,20 +64,56 @@ def save_json(file: Path | None, result: Any) -> None:
             temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
 
 
-def write_results(flown: Any, folder: Path, *, report: bool) -> dict[str, Path]:
-    """Recording, metrics, resolved mission and report of one run, each written atomically."""
+RUN_FILES = ("recording.h5", "metrics.json", "mission.toml", "replay.html", "report.html")
+"""What a result folder of `run` may hold, beside figures."""
+
+
+def check_out(folder: Path | None, ours: Sequence[str]) -> None:
+    """Refuse a result folder that holds what is not ours to replace.
+
+    A folder that is missing, empty or holds one of the files that this command writes (``ours``) will do.
+
+    Raises
+    ------
+    ColiftError
+        With the option that chose it.
+
+    """
+    if folder is None or not folder.exists():
+        return
+    if not folder.is_dir():
+        raise ColiftError(f"--out {folder}: is a file, not a folder")
+    inside = {path.name for path in folder.iterdir()}
+    if inside and inside.isdisjoint(ours):
+        raise ColiftError(
+            f"--out {folder}: is not empty and holds no results of this command ({ours[0]}); "
+            "choose another folder"
+        )
+
+
+def write_results(
+    flown: Any, folder: Path, *, report: bool, files: dict[str, Path] | None = None
+) -> dict[str, Path]:
+    """Recording, metrics, resolved mission and report of one run, each written atomically.
+
+    What else an earlier run left in the folder goes once the recording is whole. ``files`` gets what is written, also
+    if the next file fails.
+    """
     import tomli_w
 
     from colift.recording import atomic_path
 
-    files = {"recording": flown.recording.save(folder / "recording.h5")}
-    for name, text in (
-        ("metrics", json.dumps(plain(flown.metrics), indent=2) + "\n"),
-        ("mission", tomli_w.dumps(flown.mission.resolved())),
+    files = {} if files is None else files
+    files["recording"] = flown.recording.save(folder / RUN_FILES[0])
+    for name in RUN_FILES[1:]:
+        (folder / name).unlink(missing_ok=True)
+    for name, file, text in (
+        ("metrics", "metrics.json", json.dumps(plain(flown.metrics), indent=2) + "\n"),
+        ("mission", "mission.toml", tomli_w.dumps(flown.mission.resolved())),
     ):
-        files[name] = folder / ("metrics.json" if name == "metrics" else "mission.toml")
-        with atomic_path(files[name]) as temporary:
+        with atomic_path(folder / file) as temporary:
             temporary.write_text(text, encoding="utf-8")
+        files[name] = folder / file
     if report:
         from colift.report.html import write_report
         from colift.viewer.data import payload

@@ -12,6 +12,7 @@ from colift.cli.base import (
     Json,
     With,
     app,
+    check_out,
     emit,
     err,
     loading,
@@ -62,6 +63,8 @@ def judge(
     import shlex
 
     from colift.mission.load import parse_override
+
+    check_out(folder, ("judgement.json",))
 
     with loading():
         from colift import judgement

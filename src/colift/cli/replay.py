@@ -18,7 +18,10 @@ MOST = 3
 @app.command()
 def replay(
     recordings: Annotated[
-        list[Path], typer.Argument(help=f"One recording, or up to {MOST} to see side by side.")
+        list[Path],
+        typer.Argument(
+            help=f"A recording or the result folder of a run; up to {MOST} are seen side by side."
+        ),
     ],
     html: Annotated[
         Path | None,

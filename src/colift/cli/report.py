@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from colift.cli.base import Json, app, emit, out
+from colift.cli.base import RUN_FILES, Json, app, check_out, emit, out
 
 
 @app.command()
 def report(
-    recording: Annotated[Path, typer.Argument(help="A recording, simulated or imported.")],
+    recording: Annotated[Path, typer.Argument(help="A recording, or the result folder of a run.")],
     folder: Annotated[
         Path | None,
         typer.Option("--out", help="Result folder.", show_default="the recording's name"),
@@ -27,8 +27,10 @@ def report(
     from colift.verdict import judge
 
     flight = Recording.load(recording)
+    target = folder or (recording if recording.is_dir() else recording.with_suffix(""))
+    check_out(target, (*RUN_FILES[::-1], "figures"))
     numbers = metrics.compute(flight)
-    page = write_report(flight, folder or recording.with_suffix(""), metrics=numbers)
+    page = write_report(flight, target, metrics=numbers)
     verdict = judge(flight, numbers)
     if as_json:
         said = {"level": verdict.level, "reasons": verdict.reasons}

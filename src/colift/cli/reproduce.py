@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from colift.cli.base import Json, app, emit, loading, new_folder, out, progress
+from colift.cli.base import Json, app, check_out, emit, loading, new_folder, out, progress
 
 
 @app.command()
@@ -26,6 +26,7 @@ def reproduce(
     Each row ends in a verdict: reproduced, better, or differs because of a named reason. The
     paper's errata are each demonstrated by a flight or a computation.
     """
+    check_out(folder, ("reproduction.json",))
     with loading():
         from colift import reproduction
     with progress("Reproducing the paper") as advance:

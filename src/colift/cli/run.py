@@ -11,10 +11,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from colift.cli.base import (
+    RUN_FILES,
     Json,
     Sets,
     With,
     app,
+    check_out,
     emit,
     end_with,
     loading,
@@ -43,6 +45,7 @@ def run(
 ) -> None:
     """Fly a mission; print what happened; write recording, metrics and report.
 
+    A folder given with --out must be empty, or hold an earlier run, which is replaced.
     Exit code 3 if the load or the team was lost, 4 if a criterion was missed: the mission's, or a default.
 
     [bold]Examples[/bold]
@@ -53,6 +56,7 @@ def run(
     """
     from colift.mission.load import parse_overrides
 
+    check_out(folder, RUN_FILES)
     with loading():
         import colift
         from colift import metrics
@@ -67,8 +71,12 @@ def run(
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
     verdict = flown.verdict
-    target = folder or new_folder(loaded.name)
-    files = write_results(flown, target, report=report)
+    files: dict[str, Path] = {}
+    unwritten = None
+    try:
+        write_results(flown, folder or new_folder(loaded.name), report=report, files=files)
+    except OSError as error:  # what was flown is told all the same
+        unwritten = error
     if as_json:
         emit(
             {
@@ -81,6 +89,7 @@ def run(
                 "loop_time_s": flown.loop_time,
                 "compiled": flown.compiled,
                 "files": {name: str(path) for name, path in files.items()},
+                **({"error": str(unwritten)} if unwritten else {}),
             }
         )
     else:
@@ -102,4 +111,6 @@ def run(
         )
         for name, path in files.items():
             out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+    if unwritten:
+        raise unwritten
     end_with(verdict)

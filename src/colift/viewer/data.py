@@ -208,5 +208,12 @@ def load_payload(paths: Sequence[Path]) -> dict[str, Any]:
     recordings = [Recording.load(path) for path in paths]
     labels = [recording.mission.kinds.get("allocation", "on board") for recording in recordings]
     if len(set(labels)) < len(labels):
-        labels = [path.stem if path.stem != "recording" else path.parent.name for path in paths]
+        labels = [
+            path.name
+            if path.is_dir()
+            else path.parent.name
+            if path.stem == "recording"
+            else path.stem
+            for path in paths
+        ]
     return payload(recordings, [compute(recording) for recording in recordings], labels)
