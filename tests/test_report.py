@@ -13,7 +13,7 @@ import pytest
 
 import colift
 from colift import metrics
-from colift.mission.load import load_mission, mission_names
+from colift.mission import load_mission, mission_names
 from colift.recording import Recording
 from colift.report import comparison, figures, html, panels, render, style
 

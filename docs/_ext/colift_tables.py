@@ -13,12 +13,13 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from colift.catalogue import DEFAULT_KINDS
 from colift.metrics import all_metrics
 from colift.mission import schema
-from colift.mission.load import DEFAULT_KINDS
 from colift.part import FOLDERS, find, names
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
 from colift.team import Team
+from colift.wording import meanings
 
 GREEK = ("alpha", "beta", "gamma", "rho", "tau", "mu", "Omega", "omega", "lam")
 
@@ -134,10 +135,11 @@ class QuantityTable(SphinxDirective):
                 raise self.error(f"Team.{name} has shape {actual}, the table says {shape}")
             rows.append([math(symbol), code(f"Team.{name}"), code(shape), unit, frame, "-"])
         for symbol, layer, kind, name, unit, frame in GAINS:
-            field = find(layer, kind).model_fields[name]
-            found = UNIT.search(field.description or "")
+            part = find(layer, kind)
+            field, meaning = part.model_fields[name], meanings(part).get(name, "")
+            found = UNIT.search(meaning)
             if found is None or found.group(1) != unit:
-                raise self.error(f"{layer}.{name}: unit {unit} is not in {field.description!r}")
+                raise self.error(f"{layer}.{name}: unit {unit} is not in {meaning!r}")
             shape = "(3,)" if isinstance(field.default, tuple) else "()"
             text = shown(field.default)
             rows.append([math(symbol), code(f"{layer}.{name}"), code(shape), unit, frame, text])
@@ -249,14 +251,14 @@ def resolve(spec: dict[str, Any], defs: dict[str, Any]) -> dict[str, Any]:
 
 def field_rows(model: Any, skip: tuple[str, ...] = ()) -> list[list[Any]]:
     """One row per field of a pydantic model."""
-    described = model.model_json_schema()
+    described, texts = model.model_json_schema(), meanings(model)
     defs = described.get("$defs", {})
     rows: list[list[Any]] = []
     for name, field in model.model_fields.items():
         if name in skip:
             continue
         spec = described["properties"][name]
-        text = field.description or ""
+        text = texts.get(name, "")
         unit = UNIT.search(text)
         if unit and text.strip(" .") == unit.group(1):
             text = name.replace("_", " ")

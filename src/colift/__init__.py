@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from colift.allocation.base import Allocation, Allocator
     from colift.allocation.safe import SafeAllocator
     from colift.allocation.sqp import SqpAllocator
-    from colift.errors import ColiftError, MissionError
+    from colift.compilation import Warmed, warm
+    from colift.errors import ColiftError, MissionError, SettingError
     from colift.mission import Mission, load_mission
     from colift.recording import Recording
     from colift.runner import Run, run
@@ -26,11 +27,14 @@ _HOMES = {
     "Recording": "colift.recording",
     "Run": "colift.runner",
     "SafeAllocator": "colift.allocation.safe",
+    "SettingError": "colift.errors",
     "SqpAllocator": "colift.allocation.sqp",
     "Status": "colift.allocation",
     "Team": "colift.team",
+    "Warmed": "colift.compilation",
     "load_mission": "colift.mission",
     "run": "colift.runner",
+    "warm": "colift.compilation",
 }
 
 __all__ = [
@@ -42,11 +46,14 @@ __all__ = [
     "Recording",
     "Run",
     "SafeAllocator",
+    "SettingError",
     "SqpAllocator",
     "Status",
     "Team",
+    "Warmed",
     "load_mission",
     "run",
+    "warm",
 ]
 
 

@@ -20,13 +20,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, event
 from numba.extending import intrinsic, overload
 
 config: Any = numba.config
@@ -50,13 +52,46 @@ def kernel(signature: Any) -> Callable[[F], F]:
     """Compile a kernel for one explicit signature, cached on disk; called from Python, it lets other threads run."""
 
     def decorate(function: F) -> F:
-        with _cache_for(function):
+        with _without_scipy(), _cache_for(function):
             compiled: F = numba.njit(
                 signature, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH
             )(function)
+        made.append(name_of(function))
         return compiled
 
     return decorate
+
+
+made: list[str] = []
+"""Names of the kernels of this process, in the order in which they came."""
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """What a person is told that a kernel is called: where it stands, without colift's own name."""
+    return f"{function.__module__.removeprefix('colift.')}.{function.__name__.strip('_')}"
+
+
+@contextmanager
+def told_of_compilation(begin: Callable[[str], None]) -> Iterator[None]:
+    """Call ``begin`` with the name of every kernel of the block that is compiled, not loaded from the cache."""
+    with event.install_listener("numba:compile", _Listener(begin)):
+        yield
+
+
+class _Listener(event.Listener):
+    """Hears when Numba compiles; what is compiled for the sake of a kernel is a part of it."""
+
+    def __init__(self, begin: Callable[[str], None]) -> None:
+        self._begin = begin
+        self._depth = 0
+
+    def on_start(self, event: Any) -> None:
+        if self._depth == 0:
+            self._begin(name_of(event.data["dispatcher"].py_func))
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
 
 
 def inline(function: F) -> F:
@@ -66,6 +101,24 @@ def inline(function: F) -> F:
 
 
 _one_at_a_time = threading.RLock()  # for Numba's setting, which is the whole process's
+
+
+@contextmanager
+def _without_scipy() -> Iterator[None]:
+    """Spare Numba the import of SciPy (a sixth of a second), by which it learns once that there is linear algebra.
+
+    No kernel of ours calls any. The mark is taken away at once: a user's kernel that does finds SciPy.
+    """
+    mark = "scipy.linalg.cython_blas"
+    known = "numba.np.arraymath" in sys.modules or mark in sys.modules
+    if known or threading.active_count() > 1 or find_spec("scipy") is None:
+        yield
+        return
+    sys.modules[mark] = ModuleType(mark)
+    try:
+        yield
+    finally:
+        del sys.modules[mark]
 
 
 @contextmanager
@@ -170,10 +223,3 @@ def _monotonic_ns_overload() -> Any:
 @overload(thread_time_ns)
 def _thread_time_ns_overload() -> Any:
     return lambda: _read_thread()
-
-
-def compiled_before() -> bool:
-    """Whether the simulation loop is in the compilation cache (or needs no compilation)."""
-    if not JIT_ENABLED:
-        return True
-    return any(cache_folder(Path(__file__).parent / "simulation").rglob("loop.advance-*.nbi"))

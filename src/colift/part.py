@@ -8,12 +8,9 @@ into what a kernel wants: a parameter vector and a memory vector.
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import importlib.util
-import pkgutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self, cast, dataclass_transform
 
@@ -22,33 +19,16 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic._internal._model_construction import ModelMetaclass
 
+from colift import catalogue
+from colift.catalogue import FOLDERS as FOLDERS
+from colift.catalogue import LAYERS as LAYERS
+from colift.catalogue import LISTS as LISTS
 from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.team import Team
 from colift.wording import problems_of
 
 Vector = NDArray[np.float64]
 Places = NDArray[np.int64]
-
-LAYERS = (
-    "reference",
-    "sensing",
-    "estimation",
-    "load_control",
-    "allocation",
-    "link",
-    "position_control",
-    "attitude_control",
-    "actuation",
-    "detection",
-    "plant",
-)
-"""The layers of the block diagram: folder name, mission section and entry-point group suffix."""
-
-LISTS = ("disturbance", "fault")
-"""Folders of which a mission may use several parts at once; its sections of this name are lists."""
-
-FOLDERS = (*LAYERS, *LISTS)
-"""Every folder of parts."""
 
 KIND = ("kind",)
 """Key beside a part's settings in a mission's section."""
@@ -72,9 +52,7 @@ class Part(BaseModel, metaclass=_PartType):
     compiled (:func:`colift.jit.kernel`, with the layer's signature) or plain Python functions.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", validate_assignment=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", validate_assignment=True, allow_inf_nan=False)
 
     layer: ClassVar[str]
     kernel: ClassVar[Callable[..., Any]]
@@ -204,38 +182,24 @@ def load_file(path: str | Path) -> list[type[Part]]:
 
 def names(layer: str) -> list[str]:
     """Names of all parts of a layer, without importing (and so compiling) them."""
-    if layer not in FOLDERS:
-        raise UnknownNameError("layer", layer, FOLDERS)
-    folder = importlib.import_module(f"colift.{layer}")
-    own = {
-        module.name.replace("_", "-")
-        for module in pkgutil.iter_modules(folder.__path__)
-        if not module.name.startswith("_") and module.name != "base"
-    }
     registered = {kind for (of, kind) in _registered if of == layer}
-    return sorted(own | _plugged(layer).keys() | registered)
-
-
-@cache
-def _plugged(layer: str) -> dict[str, importlib.metadata.EntryPoint]:
-    """Parts of other installed packages by name; looking through all of them takes a while."""
-    return {point.name: point for point in importlib.metadata.entry_points(group=f"colift.{layer}")}
+    return sorted({*catalogue.names(layer), *registered})
 
 
 def find(layer: str, kind: str) -> type[Part]:
-    """The class behind ``kind`` in ``layer``: registered, another package's, or our own file."""
+    """The class behind ``kind`` in ``layer``: registered, our own file's, or another package's."""
     if (layer, kind) in _registered:
         return _registered[layer, kind]
-    valid = names(layer)
-    if kind not in valid:
-        raise UnknownNameError(f"{layer} part", kind, valid)
-    if point := _plugged(layer).get(kind):
-        part = point.load()
-        if not (isinstance(part, type) and issubclass(part, Part)):
-            raise ColiftError(f"entry point {point.value!r} is not a colift part")
-        return part
-    module = importlib.import_module(f"colift.{layer}.{kind.replace('-', '_')}")
-    return _parts_of(module, module.__name__)[0]
+    if kind in catalogue.own_names(layer):
+        module = importlib.import_module(f"colift.{layer}.{kind.replace('-', '_')}")
+        return _parts_of(module, module.__name__)[0]
+    point = catalogue.plugged(layer).get(kind)
+    if point is None:
+        raise UnknownNameError(f"{layer} part", kind, names(layer))
+    part = point.load()
+    if not (isinstance(part, type) and issubclass(part, Part)):
+        raise ColiftError(f"entry point {point.value!r} is not a colift part")
+    return part
 
 
 def make(layer: str, table: Mapping[str, Any]) -> Part:
@@ -264,7 +228,7 @@ def kind_of(part: type[Part]) -> str:
             return kind
     if part.__module__.startswith(f"colift.{part.layer}."):
         return part.__module__.rpartition(".")[2].replace("_", "-")
-    points = importlib.metadata.entry_points(group=f"colift.{part.layer}")
+    points = catalogue.plugged(part.layer).values()
     return next(point.name for point in points if point.load() is part)
 
 

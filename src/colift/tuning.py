@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 RATE_MARGIN = math.radians(60.0)
 """Phase margin of the body-rate loop."""
@@ -31,8 +31,6 @@ class Bandwidths(NamedTuple):
 
 class Delays(BaseModel):
     """What stands between a motion and the answer to it; the settings that delay-aware parts share."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
     """Age of the measurements, s."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import difflib
+import inspect
 import json
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -85,6 +89,24 @@ def problems_of(
             problem = replace(problem, message=f"{earlier.message}, or {problem.message}")
         found[problem.path] = problem
     return [p for path, p in found.items() if not any(f.startswith(f"{path}.") for f in found)]
+
+
+def meanings(model: type[BaseModel]) -> dict[str, str]:
+    """What the docstrings below a model's fields say, by field; read from the sources when asked for."""
+    found: dict[str, str] = {}
+    for cls in reversed(model.__mro__):
+        if cls is BaseModel or not issubclass(cls, BaseModel):
+            continue
+        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+        assert isinstance(definition, ast.ClassDef)
+        for field, below in pairwise(definition.body):
+            match field, below:
+                case (
+                    ast.AnnAssign(target=ast.Name(id=name)),
+                    ast.Expr(value=ast.Constant(value=str(text))),
+                ):
+                    found[name] = inspect.cleandoc(text)
+    return {name: found[name] for name in model.model_fields if name in found}
 
 
 _WORDS = {

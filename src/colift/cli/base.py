@@ -5,21 +5,21 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 
+from colift.cli._commands import Commands
 from colift.errors import ColiftError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.status import Status
+
     from colift.simulation.flight import Progress as Report
     from colift.verdict import Verdict
 
@@ -31,14 +31,33 @@ EXIT_INTERRUPTED = 130
 
 app = typer.Typer(
     name="colift",
+    cls=Commands,
     help="Several multirotors carry one load on cables: allocate, control, simulate, judge.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-out = Console()
-err = Console(stderr=True)
+
+
+if TYPE_CHECKING:
+    out: Console
+    err: Console
+
+
+@cache
+def console(*, stderr: bool = False) -> Console:
+    """Where text for people goes: standard output, or standard error; made when it is first needed."""
+    from rich.console import Console
+
+    return Console(stderr=stderr)
+
+
+def __getattr__(name: str) -> Console:
+    if name in ("out", "err"):
+        return console(stderr=name == "err")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Sets = Annotated[
@@ -141,6 +160,10 @@ def numbers(text: str, least: int, most: int) -> list[int]:
 
 def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
     """Print titled tables of text; the first and the last column may wrap, a unit goes below its name."""
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
     for title, header, rows in tables:
         table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1))
         for k, name in enumerate(header):
@@ -152,7 +175,7 @@ def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> Non
             )  # fmt: skip
         for row in rows:
             table.add_row(*map(escape, row))
-        out.print(table)
+        console().print(table)
 
 
 TONES = {"pass": "green", "warn": "yellow", "fail": "red", "lost": "bold red"}
@@ -161,7 +184,9 @@ TONES = {"pass": "green", "warn": "yellow", "fail": "red", "lost": "bold red"}
 
 def show_verdict(verdict: Verdict) -> None:
     """Print the verdict and every criterion."""
-    tone = TONES[verdict.level]
+    from rich.markup import escape
+
+    tone, out = TONES[verdict.level], console()
     out.print(f"[{tone}]{escape(verdict.sentence)}[/{tone}]", highlight=False)
     for each in verdict.judged:
         mark = "[green]pass[/green]" if each.holds else "[red]FAIL[/red]"
@@ -195,20 +220,41 @@ def emit(value: Any) -> None:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Say so while compiled parts are loaded, which takes half a minute the first time."""
-    from colift.jit import compiled_before
+    """Say so when parts have to be compiled, and which, on a terminal."""
+    from colift.jit import told_of_compilation
 
-    if compiled_before():
-        yield
-        return
-    err.print("First run on this machine: compiling (about half a minute, then cached).")
-    with err.status("compiling"):
+    with ExitStack() as stack:
+        status: list[Status] = []
+
+        def tell(kernel: str) -> None:
+            if not status:
+                where = console(stderr=True)
+                where.print(
+                    "Compiling, once on this machine (`colift compile` does it beforehand)."
+                )
+                status.append(stack.enter_context(where.status("compiling")))
+            status[0].update(f"compiling {kernel}")
+
+        stack.enter_context(told_of_compilation(tell))
         yield
 
 
 @contextmanager
 def progress(title: str) -> Iterator[Report]:
     """A progress bar on a terminal; silent elsewhere."""
+    where = console(stderr=True)
+    if not where.is_terminal:
+        yield lambda _: None
+        return
+    from rich.markup import escape
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -216,7 +262,7 @@ def progress(title: str) -> Iterator[Report]:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+    with Progress(*columns, console=where, transient=True) as bar:
         task = bar.add_task(escape(title), total=1.0)
         yield lambda fraction: bar.update(task, completed=fraction)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from rich.markup import escape
-from rich.table import Table
-
 from colift.cli.base import Json, app, emit, out
 
 
@@ -13,14 +10,16 @@ def list_(
     as_json: Json = False,
 ) -> None:
     """Name the shipped missions and the parts of every layer."""
-    from colift.mission.load import mission_names, read_source
-    from colift.part import FOLDERS, names
+    from colift.catalogue import FOLDERS, mission_names, names, read_source
 
     missions = {name: read_source(name)[1].get("description", "") for name in mission_names()}
     parts = {layer: names(layer) for layer in FOLDERS}
     if as_json:
         emit({"missions": missions, "parts": parts})
         return
+    from rich.markup import escape
+    from rich.table import Table
+
     table = Table(title="Missions (colift run NAME)", title_justify="left")
     table.add_column("name", no_wrap=True)
     table.add_column("what it shows")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import importlib.resources
 import json
 import os
 import tomllib
@@ -13,66 +12,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from colift.catalogue import DEFAULT_KINDS, FOLDERS, LAYERS, LISTS, read_source
 from colift.errors import MissionError, Problem, SettingError, UnknownNameError
 from colift.mission.checks import cross_checks
 from colift.mission.mission import Mission
 from colift.mission.schema import Frame
-from colift.part import FOLDERS, KIND, LAYERS, LISTS, Part, find, names
+from colift.part import KIND, Part, find, names
 from colift.wording import parse, problems_of, shown
-
-DEFAULT_KINDS = {
-    "sensing": "ideal",
-    "estimation": "none",
-    "load_control": "pid",
-    "allocation": "safe",
-    "link": "ideal",
-    "position_control": "pid",
-    "attitude_control": "manifold",
-    "actuation": "ideal",
-    "detection": "none",
-    "plant": "rigid-cables",
-}
-
-
-def mission_names() -> list[str]:
-    """Names of the shipped missions."""
-    folder = importlib.resources.files("colift.missions")
-    return sorted(
-        f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")
-    )
-
-
-def read_source(source: str | Path) -> tuple[str, dict[str, Any]]:
-    """The raw table of a mission and how to call its source in messages.
-
-    ``source`` is the path of a TOML file or the name of a shipped mission.
-
-    Raises
-    ------
-    UnknownNameError
-        If it is neither.
-    MissionError
-        If the file cannot be read or is not TOML.
-
-    """
-    if not isinstance(source, str | os.PathLike):
-        raise SettingError.of("mission", shown(source), "must be a name, a path or a mapping")
-    path = Path(source)
-    if path.suffix == ".toml" or os.path.isfile(path):
-        label = str(path)
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, ValueError) as error:
-            raise MissionError(label, [Problem("file", "", f"cannot be read: {error}")]) from error
-    else:
-        if str(source) not in mission_names():
-            raise UnknownNameError("mission", str(source), mission_names())
-        label = f"{source}.toml (shipped)"
-        text = (importlib.resources.files("colift.missions") / f"{source}.toml").read_text("utf-8")
-    try:
-        return label, tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise MissionError(label, [Problem("file", "", f"is not valid TOML: {error}")]) from error
 
 
 def load_mission(
@@ -100,9 +46,11 @@ def load_mission(
     """
     if isinstance(source, Mapping):
         label, table = "mission", _plain(source)
-    else:
+    elif isinstance(source, str | os.PathLike):
         label, table = read_source(source)
         table = _plain(table)
+    else:
+        raise SettingError.of("mission", shown(source), "must be a name, a path or a mapping")
     problems: list[Problem] = []
     given: set[str] = set()
     for path, value in _plain(overrides or {}).items():

@@ -47,9 +47,7 @@ FactorPerDrone = Annotated[Annotated[Factor, Tag("all")] | _FactorForEach, _per_
 class Section(BaseModel):
     """A table of a mission file: unknown keys are errors, numbers are finite."""
 
-    model_config = ConfigDict(
-        extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True, validate_default=True
-    )
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
 
     def problems(self) -> list[tuple[str, str, str]]:
         """Mistakes in how the fields go together, as ``(field, value, message)``."""

@@ -1,0 +1,119 @@
+"""What there is, by name: layers, their parts, the shipped missions. Nothing is imported or compiled for it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.resources
+import os
+import pkgutil
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from colift.errors import MissionError, Problem, UnknownNameError
+
+LAYERS = (
+    "reference",
+    "sensing",
+    "estimation",
+    "load_control",
+    "allocation",
+    "link",
+    "position_control",
+    "attitude_control",
+    "actuation",
+    "detection",
+    "plant",
+)
+"""The layers of the block diagram: folder name, mission section and entry-point group suffix."""
+
+LISTS = ("disturbance", "fault")
+"""Folders of which a mission may use several parts at once; its sections of this name are lists."""
+
+FOLDERS = (*LAYERS, *LISTS)
+"""Every folder of parts."""
+
+DEFAULT_KINDS = {
+    "sensing": "ideal",
+    "estimation": "none",
+    "load_control": "pid",
+    "allocation": "safe",
+    "link": "ideal",
+    "position_control": "pid",
+    "attitude_control": "manifold",
+    "actuation": "ideal",
+    "detection": "none",
+    "plant": "rigid-cables",
+}
+"""Parts of the layers that a mission need not name."""
+
+
+def own_names(layer: str) -> list[str]:
+    """Names of the parts of a layer that colift brings."""
+    if layer not in FOLDERS:
+        raise UnknownNameError("layer", layer, FOLDERS)
+    return sorted(
+        module.name.replace("_", "-")
+        for module in pkgutil.iter_modules([str(Path(__file__).parent / layer)])
+        if not module.name.startswith("_") and module.name != "base"
+    )
+
+
+def names(layer: str) -> list[str]:
+    """Names of the parts of a layer that are installed: colift's and other packages'."""
+    return sorted({*own_names(layer), *plugged(layer)})
+
+
+def plugged(layer: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Parts of other installed packages, by name."""
+    return _plugged().get(layer, {})
+
+
+@cache
+def _plugged() -> dict[str, dict[str, importlib.metadata.EntryPoint]]:
+    """By layer; looking through all installed packages takes a while, once."""
+    points = importlib.metadata.entry_points()
+    return {
+        layer: {point.name: point for point in points.select(group=f"colift.{layer}")}
+        for layer in FOLDERS
+    }
+
+
+def mission_names() -> list[str]:
+    """Names of the shipped missions."""
+    folder = importlib.resources.files("colift.missions")
+    return sorted(
+        f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")
+    )
+
+
+def read_source(source: str | Path) -> tuple[str, dict[str, Any]]:
+    """The raw table of a mission and how to call its source in messages.
+
+    ``source`` is the path of a TOML file or the name of a shipped mission.
+
+    Raises
+    ------
+    UnknownNameError
+        If it is neither.
+    MissionError
+        If the file cannot be read or is not TOML.
+
+    """
+    path = Path(source)
+    if path.suffix == ".toml" or os.path.isfile(path):
+        label = str(path)
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, ValueError) as error:
+            raise MissionError(label, [Problem("file", "", f"cannot be read: {error}")]) from error
+    else:
+        if str(source) not in mission_names():
+            raise UnknownNameError("mission", str(source), mission_names())
+        label = f"{source}.toml (shipped)"
+        text = (importlib.resources.files("colift.missions") / f"{source}.toml").read_text("utf-8")
+    try:
+        return label, tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise MissionError(label, [Problem("file", "", f"is not valid TOML: {error}")]) from error
