@@ -78,7 +78,7 @@ class MissionError(ColiftError):
 
 
 class MissingExtraError(ColiftError):
-    """A part calls a package that is not installed; the message names the extra that brings it."""
+    """A part calls a package that is not installed; the message says how to install it."""
 
 
 class FlightDataError(ColiftError):

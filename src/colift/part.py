@@ -24,6 +24,7 @@ from colift.catalogue import FOLDERS as FOLDERS
 from colift.catalogue import LAYERS as LAYERS
 from colift.catalogue import LISTS as LISTS
 from colift.errors import ColiftError, SettingError, UnknownNameError
+from colift.extras import install
 from colift.team import Team
 from colift.wording import problems_of
 
@@ -57,7 +58,7 @@ class Part(BaseModel, metaclass=_PartType):
     layer: ClassVar[str]
     kernel: ClassVar[Callable[..., Any]]
     needs: ClassVar[tuple[str, str] | None] = None
-    """Package beyond colift's own that the kernel calls, and the extra that installs it."""
+    """Package beyond colift's own that the kernel calls, and the extra that it belongs to."""
     per_drone: ClassVar[tuple[str, ...]] = ()
     """Settings that may be a list with one value per drone."""
 
@@ -108,7 +109,7 @@ class Part(BaseModel, metaclass=_PartType):
         if cls.needs is None or importlib.util.find_spec(cls.needs[0]) is not None:
             return ""
         package, extra = cls.needs
-        return f"needs the package {package}: pip install 'colift[{extra}]'"
+        return f"needs the package {package}: {install(extra)}"
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""

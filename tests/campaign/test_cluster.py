@@ -98,7 +98,7 @@ def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
 
 def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'colift\[cluster\]'"):
+    with pytest.raises(MissingExtraError, match=r"package distributed: .*pip install 'dask"):
         workers.DaskPool("tcp://127.0.0.1:1")
 
 

@@ -19,6 +19,7 @@ from typing import Any
 from colift.campaign.plan import Job, Labels
 from colift.campaign.workers import Result
 from colift.errors import ColiftError, MissingExtraError
+from colift.extras import install
 from colift.recording import atomic_path
 
 Row = dict[str, Any]
@@ -201,7 +202,7 @@ def write_parquet(rows: list[Row], path: Path) -> None:
         from pyarrow import parquet
     except ImportError:
         raise MissingExtraError(
-            "Parquet needs the package pyarrow: pip install 'colift[parquet]'"
+            f"Parquet needs the package pyarrow: {install('parquet')}"
         ) from None
     names = columns(rows)
     table = pyarrow.table({name: _column([row.get(name) for row in rows]) for name in names})

@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 from colift.campaign.plan import Job, code_digest
 from colift.errors import ColiftError, MissingExtraError
+from colift.extras import install
 
 ATTEMPTS = 2
 """How often a job is given to a worker before the death of its worker counts as its failure."""
@@ -208,7 +209,7 @@ class DaskPool:
             distributed: Any = importlib.import_module("distributed")
         except ImportError:
             raise MissingExtraError(
-                "--scheduler needs the package distributed: pip install 'colift[cluster]'"
+                f"--scheduler needs the package distributed: {install('cluster')}"
             ) from None
         self._as_completed = distributed.as_completed
         try:

@@ -15,6 +15,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from colift.errors import ColiftError, MissingExtraError
+from colift.extras import install
 from colift.live import encode, protocol
 from colift.live.page import live_page
 from colift.live.session import Row, Session
@@ -22,9 +23,7 @@ from colift.live.session import Row, Session
 try:
     from aiohttp import WebSocketError, WSCloseCode, WSMessage, WSMsgType, web
 except ModuleNotFoundError as error:
-    raise MissingExtraError(
-        "flying live needs the package aiohttp: pip install 'colift[live]'"
-    ) from error
+    raise MissingExtraError(f"flying live needs the package aiohttp: {install('live')}") from error
 
 FRAME = 1.0 / 30.0
 """Time between two messages with rows, s."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from colift.errors import BrowserError, MissingExtraError
+from colift.extras import install
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -76,7 +77,7 @@ def browser() -> Iterator[Browser]:
         from playwright.sync_api import Error, sync_playwright
     except ImportError as error:
         raise MissingExtraError(
-            "pictures of the viewer need Playwright; install colift[render]"
+            f"pictures of the viewer need the package playwright: {install('render')}"
         ) from error
     path = Path(find_browser())
     with sync_playwright() as playwright:

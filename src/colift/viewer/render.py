@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colift.errors import BrowserError, MissingExtraError
+from colift.extras import install
 from colift.recording import atomic_path
 from colift.viewer.browser import browser
 from colift.viewer.page import DRAWN, write_page
@@ -118,7 +119,9 @@ def _write_mp4(path: Path, frames: Iterator[Any], size: tuple[int, int], rate: f
     try:
         import imageio_ffmpeg
     except ImportError as error:
-        raise MissingExtraError("films need imageio-ffmpeg; install colift[render]") from error
+        raise MissingExtraError(
+            f"films need the package imageio-ffmpeg: {install('render')}"
+        ) from error
     writer = imageio_ffmpeg.write_frames(
         str(path), size, fps=rate, codec="libx264", quality=8, macro_block_size=2,
         ffmpeg_log_level="error",

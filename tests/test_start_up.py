@@ -1,0 +1,237 @@
+"""Help and names come at once, kernels when they are needed; messages say what can be installed."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+import colift
+from colift import catalogue, extras, jit
+from colift.cli import _commands
+from colift.part import find
+
+ROOT = Path(__file__).parents[1]
+HEAVY = {"numpy", "numba", "llvmlite", "scipy", "h5py", "matplotlib"}
+EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+needs_jit = pytest.mark.skipif(not jit.JIT_ENABLED, reason="compiled kernels only")
+
+
+def modules_after(*arguments: str) -> set[str]:
+    """What `colift ARGUMENTS` has imported when it ends."""
+    script = (
+        "import sys\n"
+        f"sys.argv = ['colift', *{arguments!r}]\n"
+        "from colift.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print('\\n@' + ' '.join(sys.modules))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], text=True, capture_output=True, check=True, timeout=300
+    )
+    return set(done.stdout.rpartition("@")[2].split())
+
+
+def test_help_imports_nothing_heavy():
+    found = modules_after("--help")
+    assert not found & {*HEAVY, "pydantic", "rich.console", "rich.progress"}
+    assert not {name for name in found if name.startswith("colift.cli.")} - {
+        "colift.cli.base", "colift.cli._commands",
+    }  # fmt: skip
+
+
+def test_list_imports_neither_kernels_nor_numbers():
+    found = modules_after("list")
+    assert not found & HEAVY
+    assert not found & {"colift.part", "colift.jit", "colift.mission.load"}
+
+
+def test_a_command_imports_itself_alone():
+    found = modules_after("list", "--json")
+    assert not found & {"rich.table", "rich.progress", "colift.cli.run", "colift.cli.stress"}
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flight") / "out"
+    return modules_after(
+        "run", "--no-report", "--json", "--set", "timing.duration=0.1", "--out", str(folder)
+    )
+
+
+def test_a_run_without_report_draws_nothing(flown):
+    assert not flown & {"matplotlib", "scipy.linalg", "rich.progress", "PIL", "mujoco", "casadi"}
+
+
+@needs_jit
+def test_a_run_loads_the_kernels_of_its_mission_only(flown):
+    kernels = {
+        name for name in flown
+        if (parts := name.split("."))[0] == "colift" and len(parts) == 3
+        and parts[1] in catalogue.FOLDERS and not parts[2].startswith("_") and parts[2] != "base"
+    }  # fmt: skip
+    assert "colift.allocation.sqp" in kernels
+    assert "colift.allocation.safe" not in kernels
+    assert len(kernels) <= 15
+
+
+@needs_jit
+def test_numba_does_not_import_scipys_linear_algebra_and_still_finds_it():
+    pytest.importorskip("scipy")
+    script = """
+import sys
+import colift.reference.hover
+assert "scipy.linalg" not in sys.modules and "scipy.linalg.cython_blas" not in sys.modules
+import numba, numpy as np
+product = numba.njit(lambda a, b: np.dot(a, b))
+a, b = np.array([[2.0, 1.0], [1.0, 3.0]]), np.array([[1.0, 2.0], [0.0, 1.0]])
+assert np.allclose(product(a, b), a @ b)
+"""
+    subprocess.run([sys.executable, "-W", "ignore", "-c", script], check=True, timeout=600)
+
+
+def test_help_says_of_each_command_what_its_file_says():
+    app = __import__("colift.cli", fromlist=["app"]).app
+    for name, module in _commands.files().items():
+        __import__(f"colift.cli.{module}")
+        (info,) = (
+            i for i in app.registered_commands if i.callback.__module__.endswith(f".{module}")
+        )
+        assert (info.name or info.callback.__name__) == name
+        first = " ".join(info.callback.__doc__.split())
+        assert _commands.summary(module)
+        assert first.startswith(_commands.summary(module))
+
+
+def test_a_misspelt_command_names_the_nearest():
+    done = subprocess.run(
+        [sys.executable, "-m", "colift", "comapre"], text=True, capture_output=True, check=False
+    )
+    assert done.returncode == 2
+    assert "'compare'" in done.stderr
+
+
+# ---------------------------------------------------------------- compiling beforehand
+
+
+@needs_jit
+def test_warm_compiles_once_and_tells(tmp_path):
+    script = """
+import json
+import colift
+told = []
+done = colift.warm(allocator="min-norm", progress=lambda share, kernel: told.append([share, kernel]))
+again = colift.warm(allocator="min-norm")
+colift.Allocator(__import__("colift.part").part.find("allocation", "min-norm")(), 4).allocate([0, 0, 2])
+print(json.dumps([told, done.compiled, done.loaded, again.compiled, again.loaded]))
+"""
+    environment = os.environ | {"COLIFT_CACHE": str(tmp_path)}
+    runs = []
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            env=environment, text=True, capture_output=True, check=True, timeout=600,
+        )  # fmt: skip
+        assert done.stderr == ""  # a library prints nothing
+        runs.append(json.loads(done.stdout))
+    first, second = runs
+    name = "allocation.min_norm.allocate"
+    assert first == [[[0.0, name], [1.0, ""]], [name], 0, [], 0]
+    assert second == [[[1.0, ""]], [], 1, [], 0]
+
+
+@needs_jit
+def test_compile_says_how_much_it_did_and_is_done_when_all_is_there(tmp_path):
+    command = [sys.executable, "-m", "colift", "compile", "--allocator", "min-norm", "--json"]
+    environment = os.environ | {"COLIFT_CACHE": str(tmp_path)}
+    done = [
+        json.loads(subprocess.run(
+            command, env=environment, text=True, capture_output=True, check=True, timeout=600
+        ).stdout)
+        for _ in range(2)
+    ]  # fmt: skip
+    assert [(each["compiled"], each["loaded"]) for each in done] == [
+        (["allocation.min_norm.allocate"], 0), ([], 1),
+    ]  # fmt: skip
+
+
+@needs_jit
+def test_what_a_mission_needs_is_there_after_it_was_warmed():
+    script = """
+import colift
+from colift import jit
+mission = {"name": "x", "reference": {"kind": "hover"}, "plant": {"kind": "slack-cables"},
+           "disturbance": [{"kind": "wind"}], "timing": {"duration": 0.1},
+           "events": [{"at": 0.05, "field": "allocation.kind", "value": "sqp"}]}
+colift.warm(mission)
+before = len(jit.made)
+colift.run(mission)
+assert len(jit.made) == before, jit.made[before:]
+"""
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=900)
+
+
+def test_what_cannot_be_warmed_is_refused():
+    with pytest.raises(colift.ColiftError, match="did you mean 'safe'"):
+        colift.warm(allocator="saef")
+    with pytest.raises(colift.ColiftError, match="no mission named 'hovr'"):
+        colift.warm("hovr")
+
+
+# ---------------------------------------------------------------- what can be installed
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+@pytest.mark.parametrize("installed", [True, False])
+def test_what_a_message_installs_is_what_the_project_declares(extra, installed, monkeypatch):
+    if not installed:
+
+        def absent(_name):
+            raise extras.importlib.metadata.PackageNotFoundError
+
+        monkeypatch.setattr(extras.importlib.metadata, "requires", absent)  # fmt: skip
+    found = {Requirement(text) for text in extras.requirements(extra)}
+    assert found == {Requirement(text) for text in EXTRAS[extra]}
+    assert all(f"{each.name}" in extras.install(extra) for each in found)
+    assert "colift[" not in extras.install(extra)
+
+
+def test_the_command_is_for_this_python(monkeypatch):
+    monkeypatch.setattr(
+        extras.shutil, "which", lambda _, path=None: None if path else "/usr/bin/pip"
+    )
+    assert extras.install("qp").startswith(f"{sys.executable} -m pip install ")
+
+
+def test_no_message_names_an_install_that_does_not_work():
+    """Every text in the sources that says how to install takes its command from the project's own declaration."""
+    for path in (ROOT / "src/colift").rglob("*.py"):
+        texts = [
+            node.value for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        ]  # fmt: skip
+        assert not [text for text in texts if re.search(r"pip install \S|colift\[", text)], path
+    for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
+        assert "colift[" not in path.read_text(), path
+
+
+def test_every_part_that_needs_a_package_names_an_extra_that_brings_it(monkeypatch):
+    needing = [
+        part for layer in catalogue.LAYERS for kind in catalogue.own_names(layer)
+        if (part := find(layer, kind)).needs
+    ]  # fmt: skip
+    assert len(needing) >= 4
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    for part in needing:
+        package, extra = part.needs
+        assert any(Requirement(text).name == package for text in EXTRAS[extra])
+        assert f"needs the package {package}: " in part.missing()
+        assert extras.install(extra) in part.missing()
