@@ -15,7 +15,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from colift.catalogue import DEFAULT_KINDS
 from colift.metrics import all_metrics
-from colift.mission import schema
+from colift.mission import Mission, schema
 from colift.part import FOLDERS, find, names
 from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
 from colift.team import Team
@@ -298,10 +298,10 @@ class FieldTable(SphinxDirective):
             ]
         plain = ("name", "description", "seed")
         known = {*plain, *self.sections, "kinds", "list_kinds", *FOLDERS}
-        if missing := set(schema.Mission.model_fields) - known:
+        if missing := set(Mission.model_fields) - known:
             raise self.error(f"the mission has sections that this page lacks: {sorted(missing)}")
         skip = tuple(known - set(plain))
-        return [table(FIELD_HEAD, field_rows(schema.Mission, skip))]
+        return [table(FIELD_HEAD, field_rows(Mission, skip))]
 
 
 class PartTables(SphinxDirective):
