@@ -1,4 +1,4 @@
-"""One drop and catch on every plant that catches: ``python docs/figures/catches.py`` prints a Markdown table.
+"""One drop and catch on every plant that catches: ``python docs/figures/catches.py`` writes the table of ``theory/plant.md``.
 
 A reference that falls faster than gravity allows leaves all cables slack; then they catch the load. *Transmitted* is what
 two neighbouring drones lose of their momentum along the cable, beyond thrust and weight, from the first catch until the
@@ -6,6 +6,7 @@ ends of the cable part no more.
 """
 
 import numpy as np
+from pages import fill, table
 
 from colift import metrics
 from colift.mission import load_mission
@@ -25,8 +26,12 @@ MISSION = {
 BOUNCE = 20
 """Steps after the first catch in which its compression ends on every plant."""
 
-print("| plant | first catch, cables 0 / 1 (N s) | transmitted (N s) ", end="")
-print("| largest of the flight (N s) | peak tension (N) |\n|---|---|---|---|---|")
+HEADER = (
+    "plant", "first catch, cables 0 / 1 (N s)", "transmitted (N s)", "largest of the flight (N s)",
+    "peak tension (N)",
+)  # fmt: skip
+
+rows = []
 for kind in names("plant"):
     if kind == "rigid-cables" or find("plant", kind).missing():
         continue
@@ -34,21 +39,27 @@ for kind in names("plant"):
     team, dt = r.mission.true_team, r.time[1] - r.time[0]
     caught = r["catch_impulses"]
     first = int(np.flatnonzero(caught.max(axis=1) > 0.1)[0])
-    rows = slice(first - 3, first + BOUNCE)
-    w, x, y, z = np.moveaxis(r["attitudes"][rows], -1, 0)
+    span = slice(first - 3, first + BOUNCE)
+    w, x, y, z = np.moveaxis(r["attitudes"][span], -1, 0)
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
-    free = r["applied_thrusts"][rows, :, None] * up / team.masses[:, None] - [0, 0, team.gravity]
-    alpha, velocity = r["directions"][rows], r["velocities"][rows]
+    free = r["applied_thrusts"][span, :, None] * up / team.masses[:, None] - [0, 0, team.gravity]
+    alpha, velocity = r["directions"][span], r["velocities"][span]
     gained = np.diff(velocity, axis=0) - dt * free[:-1]
     pulled = team.masses * np.sum(gained * alpha[:-1], axis=2)
-    parting = np.sum(alpha * (r["load"][rows, 1][:, None] - velocity), axis=2)
+    parting = np.sum(alpha * (r["load"][span, 1][:, None] - velocity), axis=2)
     # Of the step in which the ends turn back, the share before they do.
     share = np.clip(parting[:-1] / np.maximum(parting[:-1] - parting[1:], 1e-12), 0.0, 1.0)
     if kind == "slack-cables":  # all at once
         share[:] = 1.0
     sent = np.sum(np.where(parting[:-1] > 0.0, share, 0.0) * pulled, axis=0)
-    values, each = metrics.compute(r), caught[rows].max(axis=0)
-    print(
-        f"| `{kind}` | {each[0]:.3f} / {each[1]:.3f} | {sent[0]:.2f} / {sent[1]:.2f} "
-        f"| {values['max_catch_impulse_Ns']:.3f} | {values['peak_tension_N']:.3g} |"
+    values, each = metrics.compute(r), caught[span].max(axis=0)
+    rows.append(
+        [
+            f"`{kind}`",
+            f"{each[0]:.3f} / {each[1]:.3f}",
+            f"{sent[0]:.2f} / {sent[1]:.2f}",
+            f"{values['max_catch_impulse_Ns']:.3f}",
+            f"{values['peak_tension_N']:.3g}",
+        ]
     )
+fill("theory/plant.md", "catches", table(HEADER, rows))
