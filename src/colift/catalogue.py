@@ -44,7 +44,7 @@ DEFAULT_KINDS = {
     "attitude_control": "manifold",
     "actuation": "ideal",
     "detection": "none",
-    "plant": "rigid-cables",
+    "plant": "slack-cables",
 }
 """Parts of the layers that a mission need not name."""
 

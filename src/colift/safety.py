@@ -17,6 +17,7 @@ from colift.allocation.safe import Safe
 from colift.allocation.sqp import Sqp
 from colift.geometry import Array, pairwise_angles
 from colift.jit import f8, kernel, matrix, monotonic_ns, vector, void
+from colift.math import shares
 from colift.runner import run
 from colift.team import Team
 
@@ -355,6 +356,12 @@ def _verdict(ours: Flown, paper: Flown) -> str:
     return words if paper.survives else f"{words}; the paper's allocator does not survive"
 
 
+def _percent(share: float, cycles: int) -> str:
+    """A share of cycles in percent, its interval behind it."""
+    low, high = shares.interval(round(share * cycles), cycles)
+    return f"{100 * share:.3f} ({shares.percent(low, high, 3).removesuffix(' %')})"
+
+
 def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[str]]]]:
     """The result as titled tables: header and rows of text."""
     rows = []
@@ -366,15 +373,16 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[s
                 f"{ours['least_angle']:.0f}",
                 f"{ours['smallest_angle']:.2f}",
                 f"{paper['smallest_angle']:.2f}",
-                f"{100 * ours['yield_share']:.3f}",
-                f"{100 * ours['avoidable_share']:.3f}",
+                _percent(ours["yield_share"], ours["cycles"]),
+                _percent(ours["avoidable_share"], ours["cycles"]),
                 f"{ours['median_us']:.1f}",
                 f"{ours['p99_us']:.1f}",
                 "holds" if ours["holds"] else "BROKEN",
             ]
         )
     yield (
-        f"Allocators alone, {result['cycles']} cycles of 10 ms each: angles in degrees, times in us",
+        f"Allocators alone, {result['cycles']} cycles of 10 ms each: angles in degrees, times in us; shares with "
+        "their 95 % interval, as if cycles were independent",
         [
             "n",
             "forces",

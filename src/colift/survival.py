@@ -10,6 +10,7 @@ import numpy as np
 
 from colift import metrics
 from colift.allocation._feasibility import spread_formation
+from colift.math import shares
 from colift.mission.load import load_mission
 from colift.mission.mission import Mission
 from colift.recording import Recording
@@ -166,6 +167,7 @@ def summary(results: Iterable[Survival]) -> list[dict[str, Any]]:
                 "drones": n,
                 "flights": len(group),
                 "survived": len(alive),
+                "interval": shares.interval(len(alive), len(group)),
                 "descended": sum(result.outcome.startswith("descended") for result in group),
                 "found": len(delays),
                 "slowest_detection_s": max(delays, default=float("nan")),

@@ -148,7 +148,9 @@ def test_errata_printed_sign_of_the_load_law_pushes_the_load_down():
 
 
 def test_errata_printed_sign_drops_the_load():
+    """On the paper's rods, on which drones below the load push."""
     settings_ = {"allocator": "sqp", "timing__duration": 0.5, "start__load_offset": [0.0, 0.0, 0.0]}
+    settings_["plant__kind"] = "rigid-cables"
     right = colift.run("hover", **settings_).recording
     wrong = colift.run("hover", load_control__sign="as-printed", **settings_).recording
     assert right["load"][-1, 0, 2] == pytest.approx(1.0, abs=0.02)

@@ -66,6 +66,20 @@ def test_flies_two_seconds_without_failures(name):
     assert run.metrics["tracking_max_m"] < 0.1
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_cables_go_slack_unless_the_paper_says_rods_and_the_verdict_is_good(name):
+    run = colift.run(name)
+    assert run.mission.kinds["plant"] == (
+        "rigid-cables" if name == "paper-spiral" else "slack-cables"
+    )
+    assert run.verdict.ok, run.verdict.sentence
+
+
+def test_a_mission_that_names_no_plant_flies_on_cables():
+    mission = load_mission({"name": "plain", "reference": {"kind": "hover"}})
+    assert mission.kinds["plant"] == "slack-cables"
+
+
 def _short(mission):
     resolved = load_mission(mission).resolved()
     resolved["timing"]["duration"] = 2.0

@@ -8,6 +8,7 @@ import pytest
 import colift
 from colift.allocation import Status
 from colift.detection.residuals import Residuals
+from colift.errors import MissionError
 from colift.fault.base import LOAD
 from colift.fault.battery_low import BatteryLow
 from colift.fault.motor_degraded import MotorDegraded
@@ -72,8 +73,34 @@ def test_battery_falls_in_equal_steps():
     assert {(c.signal, c.drone) for c in changes} == {("motor_health", 2)}
 
 
+def test_a_weak_motor_needs_motors():
+    """On rotors without motors it would only be a quarter less thrust, and would turn nothing."""
+    weak = {"fault": [{"kind": "cable-cut", "at": 0.5}, {"kind": "motor-degraded", "at": 0.1}]}
+    for changes in (weak, {**weak, "actuation": {"kind": "motors"}, "actuation.kind": "ideal"}):
+        with pytest.raises(MissionError) as caught:
+            load_mission("hover", changes)
+        (problem,) = caught.value.problems
+        assert problem.path == "fault.1.kind"
+        assert 'actuation.kind = "ideal" has none' in problem.message
+    load_mission("hover", {**weak, "actuation.kind": "motors"})
+    # A battery and the loss of a whole drone are the same for all four.
+    for kind in ("battery-low", "drone-lost"):
+        load_mission("hover", {"fault": [{"kind": kind, "at": 0.1}]})
+
+
+def test_a_dead_motor_turns_its_drone():
+    changes = {"actuation.kind": "motors", "fault.0.at": 0.5, "timing.duration": 1.0}
+    fault = [{"kind": "motor-degraded", "drone": 2, "motor": 0, "health": 0.0}]
+    r = colift.run(mission("ideal").resolved(), overrides={"fault": fault, **changes}).recording
+    rates = np.abs(r["rates"][:, :, :2])
+    before, after = np.nanmax(rates[r.time < 0.5]), np.nanmax(rates[r.time > 0.5], axis=(0, 2))
+    assert after[2] > 10.0 * max(before, 0.05)
+    assert after[2] > 3.0 * np.delete(after, 2).max()
+
+
 def test_two_weak_motors_of_one_drone_keep_both_faults():
     table = mission("ideal").resolved()
+    table["actuation"] = {"kind": "motors"}
     table["fault"] = [
         {"kind": "motor-degraded", "at": 0.1, "drone": 1, "motor": 0, "health": 0.9},
         {"kind": "motor-degraded", "at": 0.2, "drone": 1, "motor": 2, "health": 0.8},

@@ -29,3 +29,5 @@ class ActuationPart(Part):
     """Base of all models of the rotors."""
 
     layer: ClassVar[str] = "actuation"
+    has_motors: ClassVar[bool] = True
+    """Whether a motor acts at its own place, so that a weak one turns its drone."""

@@ -21,6 +21,7 @@ def _act(  # type: ignore[no-untyped-def]
 
 
 class Ideal(ActuationPart):
-    """No lag and no limits; a weak motor takes its quarter from thrust and torque alike; no settings."""
+    """No lag, no limits and no motors of their own: a mission in which one fails needs ``motors``; no settings."""
 
     kernel = _act
+    has_motors = False

@@ -34,6 +34,8 @@ class FaultPart(Part):
     """Base of all faults: when, and which drone."""
 
     layer: ClassVar[str] = "fault"
+    needs_motors: ClassVar[bool] = False
+    """Whether it says nothing of a drone without motors of its own (of ``actuation``)."""
 
     at: Annotated[float, Field(ge=0.0)] | Literal["random"] = "random"
     """Time, s; random: any time of the flight, by the seed."""

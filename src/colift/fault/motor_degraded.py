@@ -11,7 +11,9 @@ from colift.fault.base import Change, FaultPart
 
 
 class MotorDegraded(FaultPart):
-    """One motor of a drone gives only a share of its thrust; the others are as before."""
+    """One motor of a drone gives only a share of its thrust, which turns the drone; the others are as before."""
+
+    needs_motors = True
 
     motor: Annotated[int, Field(ge=0, le=3)] = 0
     """Number of the motor, from 0, anticlockwise from the one at +x, +y."""

@@ -12,7 +12,7 @@ from colift.allocation.base import AllocatorPart
 from colift.errors import Problem, UnknownNameError
 from colift.fault.base import FaultPart
 from colift.mission.schema import Frame, Section, Timing
-from colift.part import KIND, Part, find
+from colift.part import KIND, Part, find, kind_of
 from colift.simulation.loop import MAX_DISTURBANCES
 from colift.simulation.signals import columns
 from colift.wording import parse, problems_of, shown
@@ -74,6 +74,13 @@ def cross_checks(
     for i, fault in enumerate(lists["fault"]):
         assert isinstance(fault, FaultPart)
         at, drone = fault.at, fault.drone
+        rotors = parts.get("actuation")
+        if fault.needs_motors and rotors is not None and not type(rotors).has_motors:  # type: ignore[attr-defined]
+            message = (
+                f'needs motors, but actuation.kind = "{kind_of(type(rotors))}" has none: a weak motor would not '
+                'turn its drone; set actuation.kind = "motors"'
+            )
+            yield Problem(f"fault.{i}.kind", kind_of(type(fault)), message)
         if "timing" not in broken and at != "random" and at > timing.duration:
             message = f"must be within timing.duration = {timing.duration:g} s"
             yield Problem(f"fault.{i}.at", f"{at:g}", message)
