@@ -56,30 +56,40 @@ def test_less_than_the_resolution_is_a_tie() -> None:
     assert about(level, "Slack") == "Slack (total): no difference worth the name (0 s)."
 
 
-def test_who_drops_the_load_is_named_and_not_ranked() -> None:
+def test_who_drops_the_load_or_misses_a_criterion_is_named_and_not_ranked() -> None:
     rows = [
-        row("light", tension_integral_Ns=1.0, outcome="diverged before t = 3 s"),
-        row("far", tension_integral_Ns=2.0) | {"tracking_max_m": judge.LOST + 0.01},
+        row("light", tension_integral_Ns=1.0, level="lost"),
+        row("diverged", tension_integral_Ns=1.0, outcome="diverged before t = 3 s"),  # no verdict
+        row("near", tension_integral_Ns=2.0, level="fail"),
         row("broken", status="failed", error="ValueError: no"),
-        row("a", tension_integral_Ns=20.0),
-        row("b", tension_integral_Ns=10.0),
+        row("other", status="refused", error="allocation.mu: unknown key"),
+        row("a", tension_integral_Ns=20.0, level="warn"),
+        row("b", tension_integral_Ns=10.0, level="pass"),
     ]
     text = said(rows)
-    assert text[0].startswith("2 of 5 flights were held to the end, in 2 the load was lost")
-    assert text[0].endswith("1 ended in an error.")
-    assert "light is not ranked: lost the load in 1 of 1 flights." in text
-    assert "far is not ranked: lost the load in 1 of 1 flights." in text
-    assert "broken is not ranked: ended in an error in 1 of 1 flights." in text
+    assert text[0] == (
+        "2 of 7 flights were held to the end within every criterion; 1 missed a criterion, "
+        "2 lost the load or the team, 1 ended in an error, 1 could not be set up."
+    )
+    assert "light is not ranked: of 1 flights 1 lost the load or the team." in text
+    assert "diverged is not ranked: of 1 flights 1 lost the load or the team." in text
+    assert "near is not ranked: of 1 flights 1 missed a criterion." in text
+    assert "broken is not ranked: of 1 flights 1 ended in an error." in text
+    assert "other is not ranked: of 1 flights 1 could not be set up." in text
     assert about(rows, "Tension integral").startswith(
         "Tension integral (mean): b leads with 10 N s"
     )
-    assert math.isnan(judge.contestants(rows)[0].values["tension_integral_Ns"])
+    assert all(math.isnan(c.values["tension_integral_Ns"]) for c in judge.contestants(rows)[:5])
 
 
-def test_one_flight_lost_of_many_is_enough_not_to_be_ranked() -> None:
-    rows = [row("a"), row("a", outcome="diverged before t = 1 s"), row("b"), row("c")]
+def test_one_flight_missed_of_many_is_enough_not_to_be_ranked() -> None:
+    rows = [row("a"), row("a", level="fail"), row("a", level="lost"), row("b"), row("c")]
     a, *_ = judge.contestants(rows)
-    assert (a.flights, a.held, a.lost, a.failed, a.ranked) == (2, 1, 1, 0, False)
+    assert (a.flights, a.held, a.missed, a.lost, a.failed, a.ranked) == (3, 1, 1, 1, 0, False)
+    assert (
+        "a is not ranked: of 3 flights 1 missed a criterion and 1 lost the load or the team."
+        in (said(rows))
+    )
 
 
 def test_nobody_left_is_said() -> None:
@@ -131,4 +141,6 @@ def test_rows_of_anything_else_need_only_an_allocator_and_numbers() -> None:
         {"allocator": "b", "mission": "not flown yet", "status": "missing"},
     ]
     assert [c.metric for c in judge.criteria_of(rows)] == ["min_angle_deg"]
-    assert said(rows)[0] == "All 2 allocators held the load in all of their flights (2 in total)."
+    assert said(rows)[0] == (
+        "All 2 allocators held all of their flights within every criterion (2 in total)."
+    )

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from colift.campaign import plan as module
-from colift.campaign.plan import HEADING, OFFSET, Case, Source, plan, varied
+from colift.campaign.plan import HEADING, OFFSET, Case, Source, plan, problems, sift, varied
 from colift.errors import ColiftError, MissionError
 from colift.mission.load import load_mission
 
@@ -73,6 +73,23 @@ def test_every_mistake_is_named_once_with_the_first_case_that_has_it() -> None:
     first, second = map(str, caught.value.problems)
     assert first.startswith("[seed 0 and 2 more] load.mass: must be greater than 0")
     assert second.startswith("[seed 9] load.mas: unknown key")
+
+
+def test_what_cannot_be_flown_is_sifted_out_unless_nothing_else_is_left() -> None:
+    cases = [Case({"mass": m}, "hover", {"load.mass": m}) for m in (-1, 0.2, 0.3, -2)]
+    planned, refused = sift(cases)
+    assert [labels["mass"] for labels, _ in planned] == [0.2, 0.3]
+    assert [each.row["mass"] for each in refused] == [-1, -2]
+    assert all(each.row["status"] == "refused" for each in refused)
+    assert "load.mass: must be greater than 0" in refused[0].row["error"]
+    assert [str(problem).partition(" load")[0] for problem in problems(refused)] == [
+        "[mass -1]",
+        "[mass -2]",
+    ]
+    with pytest.raises(MissionError, match="nothing was flown"):
+        sift([cases[0], cases[3]])
+    with pytest.raises(MissionError):
+        plan(cases)
 
 
 def test_seed_zero_flies_the_mission_and_others_start_a_little_off() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import concurrent.futures
+import contextlib
 import csv
 import sqlite3
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +29,9 @@ def filled(path: Path) -> list[Job]:
         jobs = [job for _, job in planned]
         numbers = {"tracking_rms_m": 0.25, "tension_integral_10s_Ns": float("nan")}
         flown = Result(
-            jobs[0].key, outcome="completed", metrics=numbers, wall_time=1.5, worker="w:1"
-        )
+            jobs[0].key, outcome="completed", level="fail", reasons=["too far", "too near"],
+            metrics=numbers, wall_time=1.5, worker="w:1",
+        )  # fmt: skip
         store.add(jobs[0], flown, None)
         store.add(jobs[1], Result(jobs[1].key, error="no, it is\n broken"), None)
     return jobs
@@ -39,10 +43,15 @@ def test_rows_say_what_was_flown_what_failed_and_what_is_missing(tmp_path: Path)
         rows = store.rows()
         assert [row["status"] for row in rows] == ["flown", "failed", "missing"]
         assert [row["key"] for row in rows] == [job.key for job in jobs]
+        assert [row["level"] for row in rows] == ["fail", "", ""]
+        assert [row["reasons"] for row in rows] == ["too far; too near", "", ""]
         assert rows[0]["tracking_rms_m"] == 0.25
         assert rows[0]["tension_integral_10s_Ns"] != rows[0]["tension_integral_10s_Ns"]  # NaN
         assert store.wall_times() == [("sqp", 0.2, 1.5)]
-        assert [row["key"] for row in store.rows([jobs[1].key])] == [jobs[1].key]
+        asked = [
+            ({"allocator": name, "seed": 0}, jobs[k]) for k, name in ((2, "safe"), (1, "ring"))
+        ]
+        assert [row["key"] for row in store.rows(asked)] == [jobs[2].key, jobs[1].key]
 
 
 def test_a_run_cannot_be_counted_twice(tmp_path: Path) -> None:
@@ -63,6 +72,65 @@ def test_a_run_whose_numbers_cannot_be_kept_leaves_nothing(tmp_path: Path) -> No
             store.add(job, Result(job.key, outcome="completed", metrics=bad), None)
         assert store.rows()[2]["status"] == "missing"
         assert "tracking_rms_m" not in store.rows()[2]
+
+
+def old(path: Path) -> list[Job]:
+    """A file as the first version wrote it."""
+    jobs = filled(path)
+    with contextlib.closing(sqlite3.connect(path)) as database, database:
+        for column in ("level", "reasons"):
+            database.execute(f"ALTER TABLE runs DROP COLUMN {column}")
+        database.execute("PRAGMA user_version = 1")
+    return jobs
+
+
+def test_a_file_without_verdicts_is_read_and_brought_up_to_date_when_added_to(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "c.sqlite"
+    jobs = old(path)
+    before = path.read_bytes()
+    with Store(path) as store:
+        rows = store.rows()
+    assert path.read_bytes() == before
+    with Store(path, create=True) as store:
+        assert repr(store.rows()) == repr(rows)
+        assert [row["status"] for row in rows] == ["flown", "failed", "missing"]
+        assert [row["level"] for row in rows] == ["", "", ""]
+        store.add(jobs[2], Result(jobs[2].key, outcome="completed", level="pass"), None)
+    with Store(path) as store:
+        assert [row["level"] for row in store.rows()] == ["", "", "pass"]
+
+
+def test_a_file_of_a_later_colift_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    filled(path)
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA user_version = 7")
+    for create in (False, True):
+        with pytest.raises(ColiftError, match="has format 7, known are 1 to 2"):
+            Store(path, create=create)
+
+
+def test_a_new_file_is_seen_whole_or_not_at_all(tmp_path: Path) -> None:
+    """Whoever reads while a campaign begins finds no file or one without results."""
+    path, begun = tmp_path / "c.sqlite", threading.Event()
+
+    def read() -> int:
+        found = 0
+        while not (begun.is_set() and found):
+            if path.exists():
+                with Store(path) as store:
+                    assert store.rows() == []
+                found += 1
+        return found
+
+    with concurrent.futures.ThreadPoolExecutor() as pool:
+        reading = pool.submit(read)
+        Store(path, create=True).__exit__()
+        begun.set()
+        assert reading.result(60.0)
+    assert [entry.name for entry in tmp_path.iterdir() if "campaign" in entry.name] == []
 
 
 def test_csv_and_parquet_hold_every_row(tmp_path: Path) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
 import subprocess
 import sys
 import time
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -17,9 +17,9 @@ import colift
 from colift.campaign import engine, stress
 from colift.campaign.plan import plan
 from colift.campaign.store import Store
-from colift.errors import ColiftError, UnknownNameError
+from colift.errors import ColiftError, MissionError, UnknownNameError
 from colift.mission import load_mission
-from colift.report.stress import matrix_tables, write_stress
+from colift.report.stress import COLUMNS, SHARES, matrix_tables, write_stress
 
 SHORT = {"timing.duration": 7.0}
 
@@ -28,7 +28,7 @@ def flown(tmp_path, conditions, **options):
     given = {"allocators": [], "plants": [], "seeds": [0], "changes": SHORT, **options}
     planned = plan(stress.cases("real-world", conditions, **given))
     outcome = engine.run(planned, engine.Options(tmp_path / "c.sqlite", workers=1))
-    return stress.verdicts(outcome.rows, {job.key: job.mission for _, job in planned})
+    return outcome.rows, {job.key: job.mission for _, job in planned}
 
 
 @pytest.mark.parametrize("condition", stress.condition_names())
@@ -83,17 +83,55 @@ def test_a_condition_replaces_the_whole_world():
     assert loaded.kinds["sensing"] == "ideal"
 
 
-def test_criteria_are_the_missions_or_sensible_ones():
+def test_criteria_are_the_missions_and_the_defaults_of_every_verdict():
     (own,) = stress.cases("real-world", ["calm"], [], [], [0])
-    assert load_mission(own.mission, own.overrides).criteria["tracking_max_m"].max == 0.1
+    assert own.load().criteria == load_mission("real-world").criteria
     (default,) = stress.cases("hover", ["calm"], [], [], [0])
-    assert set(load_mission(default.mission, default.overrides).criteria) == set(
-        stress.DEFAULT_CRITERIA
-    )
+    assert default.load().criteria == {}
     (broken,) = stress.cases("real-world", ["cable cut"], [], [], [0])
-    assert load_mission(broken.mission, broken.overrides).criteria["lost_drones"].max == 1.0
+    assert broken.load().criteria["lost_drones"].max == 1.0
+    for name, bound in own.load().criteria.items():
+        assert name == "lost_drones" or broken.load().criteria[name] == bound
     (other,) = stress.cases("hover", ["calm"], [], [], [0], {"criteria.tracking_max_m.max": 0.02})
-    assert load_mission(other.mission, other.overrides).criteria["tracking_max_m"].max == 0.02
+    assert other.load().criteria["tracking_max_m"].max == 0.02
+
+
+LAYERS_WITH_LAG = ("estimation", "load_control", "position_control", "attitude_control")
+
+
+def test_motors_fly_in_every_condition_and_their_lag_is_told():
+    for condition in stress.condition_names():
+        (case,) = stress.cases("real-world", [condition], [], [], [0])
+        loaded = case.load()
+        assert loaded.kinds["actuation"] == "motors"
+        for layer in LAYERS_WITH_LAG:
+            assert getattr(loaded, layer).lag == loaded.actuation.time_constant == 0.02
+        drags = [part.rotor_drag for part in loaded.disturbance if hasattr(part, "rotor_drag")]
+        assert drags == [0.02] * (condition == "wind" or condition.startswith("all,"))
+
+
+def test_a_mission_on_ideal_rotors_gets_motors_and_one_with_motors_keeps_its_own():
+    ideal = load_mission("real-world", {"actuation": {}, "load_control.lag": 0.01}).resolved()
+    for layer in set(LAYERS_WITH_LAG) - {"load_control"}:
+        ideal[layer]["lag"] = 0.0
+    found = load_mission(ideal, stress.motors(load_mission(ideal)))
+    assert found.kinds["actuation"] == "motors"
+    told = [getattr(found, layer).lag for layer in LAYERS_WITH_LAG]
+    assert told == [0.02, 0.01, 0.02, 0.02]  # what the mission says of a lag stays
+    # Controllers that ask for no lag are told of none.
+    assert stress.motors(load_mission("hover")) == {"actuation": {"kind": "motors"}}
+    own = load_mission("hover", {"actuation": {"kind": "motors", "max_thrust": 4.0}})
+    assert stress.motors(own) == {}
+
+
+def test_a_weak_motor_on_ideal_rotors_is_refused_before_anything_is_flown():
+    changes = {"actuation.kind": "ideal"}
+    cases = stress.cases("real-world", ["calm", "one motor dead"], [], [], [0], changes)
+    with pytest.raises(MissionError) as caught:
+        plan(cases)
+    (problem,) = caught.value.problems
+    assert problem.path.endswith("fault.0.kind")
+    assert 'actuation.kind = "ideal"' in problem.message
 
 
 def test_what_is_set_is_what_is_flown_and_what_the_table_says():
@@ -111,58 +149,74 @@ def test_what_is_set_is_what_is_flown_and_what_the_table_says():
 
 
 def test_the_matrix_counts_every_flight(tmp_path):
-    found = flown(
+    rows, _ = flown(
         tmp_path, ["calm", "wind"], plants=["rigid-cables", "slack-cables"], seeds=[0, 1],
         changes={"timing.duration": 2.0},
     )  # fmt: skip
-    cells = stress.matrix(found)
+    cells = stress.matrix(rows)
     assert list(cells) == ["calm", "wind"]
     assert all(cell.flown == 2 for row in cells.values() for cell in row.values())
-    assert sum(cell.passed for row in cells.values() for cell in row.values()) == sum(
-        verdict.passed for verdict in found
-    )
-    ((title, header, lines),) = matrix_tables(found)
-    assert (title, header) == ("safe", ["condition", "rigid-cables", "slack-cables"])
-    assert lines[0][1].startswith("2/2, ")
-    errors = [
-        verdict.row["tracking_max_m"]
-        for verdict in found
-        if verdict.row["condition"] == "wind" and verdict.row["plant"] == "rigid-cables"
-    ]
-    assert cells["wind"]["safe", "rigid-cables"].worst_m == max(errors)
+    assert {row["level"] for row in rows} <= {"pass", "warn"}
+    assert all(cell.passed == 2 for row in cells.values() for cell in row.values())
+    places = [("safe", "rigid-cables"), ("safe", "slack-cables")]
+    shared, *each = matrix_tables(rows)
+    assert shared[:2] == (SHARES, ["condition", "safe rigid-cables", "safe slack-cables"])
+    assert shared[2] == [[name, "2/2 (15-100 %)", "2/2 (15-100 %)"] for name in ("calm", "wind")]
+    for (title, header, lines), place in zip(each, places, strict=True):
+        assert title == ", ".join(place)
+        assert header == COLUMNS
+        mine = [
+            r for r in rows if r["condition"] == "wind" and (r["allocator"], r["plant"]) == place
+        ]
+        assert cells["wind"][place].worst_m == max(r["tracking_max_m"] for r in mine)
+        assert cells["wind"][place].least_deg == min(r["min_angle_deg"] for r in mine)
+        assert lines[1][1:3] == ["2/2 (15-100 %)", "0"]
 
 
 def test_a_failing_flight_has_a_reason_a_replay_and_a_mission_that_flies_it_again(tmp_path):
-    found = flown(
+    rows, missions = flown(
         tmp_path, ["calm"], changes={"timing.duration": 2.0, "criteria.min_angle_deg.min": 60.0}
     )
-    (verdict,) = found
-    assert not verdict.passed
-    assert "min_angle_deg" in verdict.reason
-    assert "not >= 60" in verdict.reason
-    page = write_stress(found, tmp_path, command="colift stress").read_text()
+    (row,) = rows
+    assert row["level"] == "fail"
+    assert stress.reason(row).startswith("min_angle_deg is ")
+    assert "not >= 60" in stress.reason(row)
+    page = write_stress(rows, missions, tmp_path, command="colift stress").read_text()
     assert 'href="failing/001.html"' in page
+    assert escape(stress.reason(row)) in page
     assert "colift-data" in (tmp_path / "failing" / "001.html").read_text()
     again = colift.run(tmp_path / "failing" / "001.toml")
-    assert again.metrics["tracking_max_m"] == verdict.row["tracking_max_m"]
+    assert again.metrics["tracking_max_m"] == row["tracking_max_m"]
+    assert (again.verdict.level, "; ".join(again.verdict.reasons)) == (row["level"], row["reasons"])
 
 
-def test_a_lost_flight_counts_as_lost():
-    row = {
-        "status": "flown", "outcome": "diverged before t = 1 s", "tracking_max_m": 0.01,
-        "min_angle_deg": 40.0, "min_height_m": 1.0, "condition": "wind", "allocator": "safe",
-        "plant": "rigid-cables", "seed": 0, "key": "k",
-    }  # fmt: skip
-    mission = load_mission("hover", {"criteria": stress.DEFAULT_CRITERIA}).resolved()
-    found = stress.verdicts([row], {"k": mission})
-    cell = stress.matrix(found)["wind"]["safe", "rigid-cables"]
-    assert (cell.passed, cell.flown, cell.worst_m) == (0, 1, math.inf)
-    assert found[0].reason == "diverged before t = 1 s"
-    assert matrix_tables(found) == [
-        ("safe", ["condition", "rigid-cables"], [["wind", "0/1, lost"]])
+def test_cells_tell_lost_missed_and_held_apart():
+    """Numbers of a flight that was lost say nothing; its loss is counted."""
+
+    def row(level, **numbers):
+        usual = {"tracking_max_m": 0.05, "min_angle_deg": 40.0, "slack_time_s": 0.25}
+        status = "flown" if level else "failed"
+        return {
+            "condition": "wind", "allocator": "safe", "plant": "slack-cables", "key": "k",
+            "status": status, "level": level, "reasons": "far", "error": "" if level else "no",
+            **(usual | numbers if level else {}),
+        }  # fmt: skip
+
+    rows = [
+        row("pass"),
+        row("warn", slack_time_s=0.5),
+        row("fail", tracking_max_m=0.2),
+        row("lost", tracking_max_m=118.0, min_angle_deg=0.003, slack_time_s=20.0),
+        row(""),
     ]
-    other = stress.verdicts([{**row, "allocator": "sqp"}], {"k": mission})
-    assert [title for title, *_ in matrix_tables(found + other)] == ["rigid-cables"]
+    cell = stress.matrix(rows)["wind"]["safe", "slack-cables"]
+    assert cell == stress.Cell(2, 2, 5, worst_m=0.2, least_deg=40.0, slack_s=0.5)
+    assert [stress.reason(each) for each in rows] == ["", "", "far", "far", "no"]
+    ((title, _, lines),) = matrix_tables(rows)
+    assert title == "safe, slack-cables"
+    assert lines == [["wind", "2/5 (5-86 %)", "2", "20.0", "40", "0.50"]]
+    (nothing,) = matrix_tables(rows[3:])[0][2]
+    assert nothing == ["wind", "0/2 (0-85 %)", "2", "-", "-", "-"]
 
 
 def command(*arguments: str) -> list[str]:
@@ -178,7 +232,22 @@ def test_the_command_prints_json_and_is_strict_when_asked(tmp_path: Path) -> Non
     hard = [*options, "--strict", "--set", "criteria.min_angle_deg.min=89.0"]
     done = subprocess.run(command(*hard), capture_output=True, text=True, check=False)
     assert done.returncode == 4
-    assert len(json.loads(done.stdout)["failing"]) == 2
+    told = json.loads(done.stdout)
+    assert [each["level"] for each in told["failing"]] == ["fail", "fail"]
+    assert told["conditions"]["calm"][0]["interval"] == pytest.approx([0.0, 0.975])
+    lax = [word for word in hard if word != "--strict"]
+    assert subprocess.run(command(*lax), capture_output=True, check=False).returncode == 0
+
+
+def test_seeds_begin_where_they_are_told_to(tmp_path: Path) -> None:
+    options = ["--seeds", "2", "--first-seed", "1000", "--set", "timing.duration=0.1"]
+    done = subprocess.run(
+        command(*options, "--out", str(tmp_path), "--json"),
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout)["seeds"] == [1000, 1001]
+    with Store(tmp_path / "campaign.sqlite") as store:
+        assert {row["seed"] for row in store.rows()} == {1000, 1001}
 
 
 def test_nothing_is_lost_when_it_is_killed_half_way(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ import pytest
 from colift.campaign.plan import HEADING, OFFSET
 from colift.campaign.sweep import METRICS, Over, cases, parse_over, points
 from colift.errors import ColiftError, MissionError
+from colift.report.campaign import not_held, sweep_tables
+from colift.report.campaign_figures import Swept
 
 
 @pytest.mark.parametrize(
@@ -80,20 +82,48 @@ def test_what_is_swept_wins_over_what_is_set() -> None:
     assert case.overrides["load.mass"] == 0.1
 
 
-def test_points_gather_seeds_and_leave_out_what_did_not_end_well() -> None:
-    def row(mass: float, angle: float, outcome: str = "completed") -> dict[str, Any]:
+def test_points_gather_seeds_and_tell_held_missed_and_lost_apart() -> None:
+    def row(mass: float, angle: float, level: str = "pass", why: str = "") -> dict[str, Any]:
         numbers = dict.fromkeys(METRICS, 1.0) | {"min_angle_deg": angle}
-        return {"load.mass": mass, "status": "flown", "outcome": outcome, **numbers}
+        return {"load.mass": mass, "status": "flown", "level": level, "reasons": why, **numbers}
+
+    def error(mass: float, status: str) -> dict[str, Any]:
+        return {"load.mass": mass, "status": status, "level": "", "error": f"{status}!"}
 
     rows = [
         row(1.0, 30.0),
-        row(1.0, 50.0),
-        row(1.0, 1.0, "diverged before t = 1 s"),
+        row(1.0, 50.0, "warn", "slack"),
+        row(1.0, 10.0, "fail", "too near"),
+        row(1.0, 0.003, "lost", "too far"),
+        row(1.0, 0.002, "lost", "too far"),
         row(2.0, math.nan),
+        error(2.0, "failed"),
+        error(3.0, "refused"),
     ]
-    rows.append({"load.mass": 2.0, "status": "failed", "outcome": "", "error": "no"})
-    first, second = points(rows, [Over("load.mass", (1.0, 2.0))])
-    assert (first.values, first.flights, first.completed) == ((1.0,), 3, 2)
-    assert first.spread["min_angle_deg"] == (40.0, 30.0, 50.0)
-    assert (second.flights, second.completed) == (2, 1)
+    overs = [Over("load.mass", (1.0, 2.0, 3.0))]
+    first, second, third = points(rows, overs)
+    assert (first.values, first.flights, first.held, first.level) == ((1.0,), 5, 2, "lost")
+    assert first.fates == {"held": 2, "missed": 1, "lost": 2}
+    assert first.reasons == ["too far", "too near"]
+    assert first.spread["min_angle_deg"] == (
+        30.0,
+        10.0,
+        50.0,
+    )  # a lost flight's numbers are nothing
+    assert (second.flights, second.held, second.level) == (2, 1, "failed")
     assert all(math.isnan(value) for value in second.spread["min_angle_deg"])
+    assert (third.level, third.refused, third.reasons) == ("refused", True, ["refused!"])
+
+    tables = sweep_tables(Swept(rows, overs))
+    assert [title for title, *_ in tables] == ["Mean", "Least", "Largest"]
+    header, lines = tables[0][1:]
+    assert header[:2] == ["mass", "held (95 %)"]
+    assert [line[1] for line in lines] == ["2/5 (5-86 %)", "1/2 (1-99 %)", "refused"]
+    assert lines[2][2:] == ["-"] * len(METRICS)
+    assert not_held(Swept(rows, overs)) == [
+        "load.mass 1.0: 2 held, 1 missed, 2 lost: too far (and 1 more)",
+        "load.mass 2.0: 1 held, 1 failed: failed!",
+        "load.mass 3.0: cannot be flown: refused!",
+    ]
+    alone = sweep_tables(Swept([rows[0], rows[5], rows[7]], overs))
+    assert [line[1] for line in alone[0][2]] == ["held", "held", "refused"]

@@ -7,8 +7,11 @@ from typing import Any
 
 from colift.campaign.plan import HEADING, OFFSET, Case, Source, without_seed
 from colift.errors import ColiftError
-from colift.mission.load import layered
+from colift.mission.load import layered, load_mission
+from colift.mission.mission import Mission
+from colift.mission.schema import Bound
 from colift.part import find, names
+from colift.verdict import criteria_of
 
 MISSIONS = ("hover", "paper-spiral", "figure-eight", "point-to-point", "four-to-three")
 """Missions of a comparison unless others are asked for."""
@@ -18,6 +21,9 @@ QUICK_MISSIONS = ("hover", "figure-eight")
 
 PERIOD = 0.01
 """Period at which every contestant allocates, s: what the slowest of them can keep on a desktop."""
+
+LEAST_ANGLE = 30.0
+"""Least angle between two cables where the mission asks for none, degrees: what the paper calls safe."""
 
 CONTEST, SPREAD = "contest", "spread"
 """The two studies: who flies how well, and what separation costs."""
@@ -49,24 +55,32 @@ def cases(
     changes: Mapping[str, Any] | None = None,
     *,
     spread: bool = True,
+    as_in_mission: bool = False,
 ) -> list[Case]:
     """Every flight of a comparison.
 
-    Each contestant flies with its own default settings in place of the mission's allocation section, and
-    allocates every :data:`PERIOD`; ``changes`` come last. The spread of those that declare a
+    Each contestant flies with its own default settings in place of the mission's allocation section (with
+    ``as_in_mission``, the one that a mission names keeps that section), and allocates every :data:`PERIOD`.
+    ``changes`` come last; one such as ``"safe.mu"`` is made for that contestant only. All are judged by
+    the criteria of the mission as it is, see :func:`bounds`. The spread of those that declare a
     :attr:`~colift.allocation.base.AllocatorPart.spread_setting` is swept on the first mission.
     """
     changes, seeds = without_seed(changes), list(seeds)
-    if "allocation.kind" in changes:
+    if "allocation" in changes or "allocation.kind" in changes:
         raise ColiftError(
             "allocation.kind is what compare varies; name contestants with --allocators"
         )
+    loaded = {mission: load_mission(mission) for mission in missions}
+    asked = {name: bounds(mission) for name, mission in loaded.items()}
 
     def case(study: str, name: str, mission: str, seed: int, **setting: Any) -> Case:
         labels = {"study": study, "allocator": name, "mission": mission, "seed": seed, **setting}
-        section = {"kind": name, **({setting["setting"]: setting["value"]} if setting else {})}
-        given = {"allocation": section, "timing.allocation": PERIOD}
-        return Case(labels, mission, layered(given, changes), seed)
+        given = {"criteria": asked[mission], "timing.allocation": PERIOD}
+        if not (as_in_mission and loaded[mission].kinds["allocation"] == name):
+            given["allocation"] = {"kind": name}
+        swept = {f"allocation.{setting['setting']}": setting["value"]} if setting else {}
+        own = _own(changes, name, allocators)
+        return Case(labels, mission, layered(given, own, swept), seed)
 
     found = [
         case(CONTEST, name, mission, seed)
@@ -83,17 +97,63 @@ def cases(
     return found
 
 
-def protocol(seeds: int, changes: Mapping[str, Any]) -> list[str]:
-    """How the flights were made, in sentences."""
-    period = float(changes.get("timing.allocation", PERIOD))
+def _own(changes: Mapping[str, Any], name: str, allocators: Sequence[str]) -> dict[str, Any]:
+    """The changes that concern one contestant, as those of the mission that it flies."""
+    found: dict[str, Any] = {}
+    for path, value in changes.items():
+        head, _, setting = path.partition(".")
+        if head == name and setting:
+            found = layered(found, {f"allocation.{setting}": value})
+        elif head not in allocators:
+            found = layered(found, {path: value})
+    return found
+
+
+def bounds(mission: Mission) -> dict[str, dict[str, float]]:
+    """What every contestant is judged by: the mission's own criteria, those that its own allocator brings included.
+
+    Where these name no angle between the cables, it is :data:`LEAST_ANGLE`: a contest in which the
+    drones may meet is none.
+    """
+    found = {
+        name: bound.model_dump(exclude_none=True) for name, bound in criteria_of(mission).items()
+    }
+    if mission.drones.count > 1:
+        found.setdefault("min_angle_deg", {"min": LEAST_ANGLE})
+    return found
+
+
+def protocol(
+    missions: Sequence[str],
+    seeds: Iterable[int],
+    changes: Mapping[str, Any],
+    *,
+    as_in_mission: bool = False,
+) -> list[str]:
+    """How the flights were made and judged, in sentences."""
+    period, seeds = float(changes.get("timing.allocation", PERIOD)), list(seeds)
+    settings = "its own default settings"
+    if as_in_mission:
+        settings += " (the one that a mission names: the mission's)"
     said = [
-        f"Every allocator has its own default settings and is called every {1e3 * period:g} ms, so that "
+        f"Every allocator has {settings} and is called every {1e3 * period:g} ms, so that "
         "slow ones can take part; reference, controllers, drones and plant are the mission's."
     ]
-    if seeds > 1:
+    groups: dict[str, list[str]] = {}
+    for mission in missions:
+        asked = bounds(load_mission(mission))
+        words = ", ".join(f"{name} {Bound(**bound)}" for name, bound in asked.items())
+        groups.setdefault(words, []).append(mission)
+    every = len(groups) == 1
+    said += [
+        f"Held{'' if every else ' in ' + ', '.join(names)} means to the end with {words}."
+        for words, names in groups.items()
+    ]
+    if seeds != [0]:
         said.append(
-            f"Seed 0 starts as the mission says; each other seed turns the start by up to {HEADING:g} "
-            f"degrees and moves the load by up to {100 * OFFSET:g} cm along each axis."
+            f"Seeds {seeds[0]} to {seeds[-1]}: seed 0 starts as the mission says; each other seed turns "
+            f"the start by up to {HEADING:g} degrees and moves the load by up to {100 * OFFSET:g} cm "
+            "along each axis."
         )
     others = {path: value for path, value in changes.items() if path != "timing.allocation"}
     if others:

@@ -94,8 +94,17 @@ def run(planned: Plan, options: Options) -> Outcome:
             with options.pool() as pool:
                 size = pool.size
                 _fly(todo, len(jobs), store, pool, options)
-        rows = store.rows(job.key for job in jobs)
+        rows = store.rows(planned)
     return Outcome(rows, len(todo), time.perf_counter() - begin, size)
+
+
+def kept(planned: Plan, file: Path) -> tuple[int, int]:
+    """How many of the flights that are planned a file holds, and how many they are."""
+    keys = {job.key for _, job in planned}
+    if not file.is_file():
+        return 0, len(keys)
+    with Store(file) as store:
+        return len(keys & store.finished()), len(keys)
 
 
 def _fly(todo: list[Job], total: int, store: Store, pool: Pool, options: Options) -> None:

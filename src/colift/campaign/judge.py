@@ -1,19 +1,18 @@
 """Who is best at what: summaries and plain words, computed from rows of results and from nothing else.
 
-A row is one flight as a mapping: ``allocator``, ``status``, ``outcome`` and metrics by name, wherever it comes
-from. Rows without ``status`` or ``outcome`` count as flown and completed; a metric that no row has is left out.
+A row is one flight as a mapping: ``allocator``, ``status``, ``level`` (of its verdict), ``outcome`` and metrics by
+name, wherever it comes from. Rows without ``status`` count as flown, those without a verdict as held if their
+``outcome`` is ``"completed"`` or not there; a metric that no row has is left out.
 """
 
 from __future__ import annotations
 
 import math
 import statistics
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-LOST = 0.5
-"""Distance of the load from its reference, m, from which on a flight counts as not held."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,9 @@ class Contestant:
     Attributes
     ----------
     name : str
-    flights, held, lost, failed : int
-        All; with the load within :data:`LOST` of its reference to the end; not so; not flown for an error.
+    flights, held, missed, lost, failed, refused : int
+        All; every criterion kept to the end; a criterion missed; load or team lost; ended in an error; not
+        possible to set up.
     values : mapping
         Criterion's metric to its value over the flights held; NaN where none was.
 
@@ -119,20 +119,35 @@ class Contestant:
     name: str
     flights: int
     held: int
+    missed: int
     lost: int
     failed: int
+    refused: int
     values: Mapping[str, float]
 
     @property
     def ranked(self) -> bool:
-        """Only who held every flight is compared: a dropped load is light and never late."""
+        """Only who held every flight is compared: a dropped load is light, and cables that meet are cheap."""
         return self.held == self.flights > 0
 
 
+def fate(row: Mapping[str, Any]) -> str:
+    """What became of a flight: held, missed (a criterion), lost, failed, refused, or missing."""
+    status = str(row.get("status") or "flown")
+    if status != "flown":
+        return status
+    if row.get("level"):
+        return {"fail": "missed", "lost": "lost"}.get(str(row["level"]), "held")
+    return "held" if row.get("outcome", "completed") == "completed" else "lost"
+
+
+WORST_FIRST = ("refused", "failed", "lost", "missed", "held")
+"""What can become of a flight that was to be flown."""
+
+
 def held(row: Mapping[str, Any]) -> bool:
-    """Whether the flight went to its end with the load near its reference."""
-    ended = row.get("status", "flown") == "flown" and row.get("outcome", "completed") == "completed"
-    return ended and not float(row.get("tracking_max_m", 0.0)) > LOST
+    """Whether the flight kept every criterion to its end."""
+    return fate(row) == "held"
 
 
 def criteria_of(rows: Iterable[Mapping[str, Any]]) -> list[Criterion]:
@@ -148,14 +163,12 @@ def contestants(rows: Sequence[Mapping[str, Any]]) -> list[Contestant]:
     for name in dict.fromkeys(str(row["allocator"]) for row in rows):
         own = [row for row in rows if row["allocator"] == name]
         good = [row for row in own if held(row)]
-        failed = sum(row.get("status") == "failed" for row in own)
+        fates = Counter(map(fate, own))
         found.append(
             Contestant(
                 name=name,
                 flights=len(own),
-                held=len(good),
-                lost=len(own) - len(good) - failed,
-                failed=failed,
+                **{each: fates[each] for each in _FATES},
                 values={c.metric: c.value(good) for c in criteria_of(rows)},
             )
         )
@@ -192,7 +205,7 @@ def words(field: Sequence[Contestant], criteria: Sequence[Criterion] = CRITERIA)
     ranked = [c for c in field if c.ranked]
     said = [_held_words(field)]
     said += [
-        f"{c.name} is not ranked: {_trouble(c)} of {c.flights} flights."
+        f"{c.name} is not ranked: of {c.flights} flights {_trouble(c)}."
         for c in field
         if not c.ranked
     ]
@@ -225,20 +238,33 @@ def words(field: Sequence[Contestant], criteria: Sequence[Criterion] = CRITERIA)
     return said
 
 
+_FATES = {
+    "held": "were held to the end within every criterion",
+    "missed": "missed a criterion",
+    "lost": "lost the load or the team",
+    "failed": "ended in an error",
+    "refused": "could not be set up",
+}
+"""What can become of a flight, in words that follow a number of flights."""
+
+
 def _held_words(field: Sequence[Contestant]) -> str:
     flights = sum(c.flights for c in field)
-    lost, failed = sum(c.lost for c in field), sum(c.failed for c in field)
-    if not lost and not failed:
-        return f"All {len(field)} allocators held the load in all of their flights ({flights} in total)."
-    return (
-        f"{flights - lost - failed} of {flights} flights were held to the end, in {lost} the load was "
-        f"lost (diverged, or more than {LOST:g} m off its reference), {failed} ended in an error."
-    )
+    counts = {each: sum(getattr(c, each) for c in field) for each in _FATES}
+    if counts["held"] == flights:
+        return (
+            f"All {len(field)} allocators held all of their flights within every criterion "
+            f"({flights} in total)."
+        )
+    others = [
+        f"{count} {_FATES[each]}" for each, count in counts.items() if count and each != "held"
+    ]
+    return f"{counts['held']} of {flights} flights {_FATES['held']}; {', '.join(others)}."
 
 
 def _trouble(contestant: Contestant) -> str:
-    parts = [(contestant.lost, "lost the load in"), (contestant.failed, "ended in an error in")]
-    return " and ".join(f"{text} {count}" for count, text in parts if count) or "held none"
+    counts = {each: getattr(contestant, each) for each in _FATES if each != "held"}
+    return _list([f"{count} {_FATES[each]}" for each, count in counts.items() if count])
 
 
 def _criterion_words(

@@ -117,6 +117,31 @@ Plan = list[tuple[Labels, Job]]
 """Every case, resolved."""
 
 
+@dataclass(frozen=True)
+class Refused:
+    """A case that cannot be flown, and why."""
+
+    labels: Labels
+    problems: tuple[Problem, ...]
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """As a row among those of the flights."""
+        error = "; ".join(map(str, self.problems))
+        return {
+            **self.labels,
+            "key": "",
+            "status": REFUSED,
+            "level": "",
+            "reasons": "",
+            "error": error,
+        }
+
+
+REFUSED = "refused"
+"""Status of a case that cannot be flown."""
+
+
 def plan(cases: Sequence[Case], sources: Sequence[Source] = ()) -> Plan:
     """Resolve every case; equal flights become equal jobs.
 
@@ -126,25 +151,46 @@ def plan(cases: Sequence[Case], sources: Sequence[Source] = ()) -> Plan:
         With the problems of all cases; each problem is named once, with the first case that has it.
 
     """
+    planned, refused = sift(cases, sources)
+    if refused:
+        raise MissionError("campaign (nothing was flown)", problems(refused))
+    return planned
+
+
+def sift(cases: Sequence[Case], sources: Sequence[Source] = ()) -> tuple[Plan, list[Refused]]:
+    """Resolve every case that can be flown, and say of the others why not.
+
+    Raises
+    ------
+    MissionError
+        If none can be flown.
+
+    """
     for source in sources:
         source.load()
     code = code_digest()
     planned: Plan = []
-    found: dict[Problem, list[Labels]] = {}
+    refused: list[Refused] = []
     for case in cases:
         try:
             mission = case.load()
         except MissionError as error:
-            for problem in error.problems:
-                found.setdefault(problem, []).append(case.labels)
+            refused.append(Refused(case.labels, error.problems))
         else:
             key = mission_key(mission, code)
             planned.append((case.labels, Job(key, mission.resolved(), code, tuple(sources))))
-    if found:
-        raise MissionError(
-            "campaign (nothing was flown)", list(map(_located, found, found.values()))
-        )
-    return planned
+    if refused and not planned:
+        raise MissionError("campaign (nothing was flown)", problems(refused))
+    return planned, refused
+
+
+def problems(refused: Iterable[Refused]) -> list[Problem]:
+    """Every problem once, with the first case that has it."""
+    found: dict[Problem, list[Labels]] = {}
+    for each in refused:
+        for problem in each.problems:
+            found.setdefault(problem, []).append(each.labels)
+    return list(map(_located, found, found.values()))
 
 
 def _located(problem: Problem, cases: list[Labels]) -> Problem:

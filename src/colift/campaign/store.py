@@ -1,15 +1,18 @@
 """The results of campaigns in one SQLite file; each run arrives in a transaction of its own.
 
-``runs`` holds what was flown, one row a hash; ``metrics`` its numbers, one row each; ``cases`` what was asked
-for and under which labels. A case whose run is missing has not been flown yet.
+``runs`` holds what was flown and its verdict, one row a hash; ``metrics`` its numbers, one row each; ``cases``
+what was asked for and under which labels. A case whose run is missing has not been flown yet.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import fcntl
 import json
+import os
 import sqlite3
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -25,12 +28,13 @@ from colift.recording import atomic_path
 Row = dict[str, Any]
 """One case, flat: labels, how it went, metrics."""
 
-_APPLICATION, _VERSION = 0x636F6C66, 1  # "colf"
+_APPLICATION, _VERSION = 0x636F6C66, 2  # "colf"
+_VERDICT = ("level TEXT NOT NULL DEFAULT ''", "reasons TEXT NOT NULL DEFAULT '[]'")
 _SCHEMA = (
-    """CREATE TABLE runs (
+    f"""CREATE TABLE runs (
         key TEXT PRIMARY KEY, mission TEXT NOT NULL, code TEXT NOT NULL, outcome TEXT NOT NULL,
         error TEXT NOT NULL, wall_time REAL NOT NULL, worker TEXT NOT NULL, versions TEXT NOT NULL,
-        recording TEXT, finished TEXT NOT NULL
+        recording TEXT, finished TEXT NOT NULL, {", ".join(_VERDICT)}
     ) WITHOUT ROWID""",
     """CREATE TABLE metrics (
         key TEXT NOT NULL REFERENCES runs, name TEXT NOT NULL, value REAL, PRIMARY KEY (key, name)
@@ -39,47 +43,64 @@ _SCHEMA = (
     f"PRAGMA application_id = {_APPLICATION}",
     f"PRAGMA user_version = {_VERSION}",
 )
+_FROM_1 = (
+    *(f"ALTER TABLE runs ADD COLUMN {column}" for column in _VERDICT),
+    f"PRAGMA user_version = {_VERSION}",
+)
+"""Brings a file of the first version, whose flights have no verdict, up to date."""
 
 
 class Store:
     """One file of results, open for reading; :meth:`writing` for the one process that adds to it.
 
+    With ``create`` a missing file is made and an older one brought up to date; its flights have no verdict.
+
     Raises
     ------
     ColiftError
-        If the file is not a campaign's, or (without ``create``) does not exist.
+        If the file is not a campaign's, is a later colift's, or (without ``create``) does not exist.
 
     """
 
     def __init__(self, path: str | Path, *, create: bool = False) -> None:
         self.path = Path(path)
         if create:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            _make(self.path)
         elif not self.path.is_file():
             raise ColiftError(f"{self.path}: no such file")
         self._db = sqlite3.connect(self.path, timeout=60.0, isolation_level=None)
         try:
-            self._set_up(create)
+            self._version = self._check()
+            if create and self._version == 1:
+                with self._transaction():
+                    self._version = self._check()  # another process may have been faster
+                    for statement in _FROM_1 if self._version == 1 else ():
+                        self._db.execute(statement)
+                self._version = _VERSION
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = FULL")
+            self._db.execute("PRAGMA foreign_keys = ON")
         except sqlite3.DatabaseError as error:
             self._db.close()
             raise ColiftError(f"{self.path}: not a file of campaign results ({error})") from error
-
-    def _set_up(self, create: bool) -> None:
-        def number(question: str) -> int:
-            return int(self._db.execute(question).fetchone()[0])
-
-        if create:
-            with self._transaction():
-                if not number("SELECT count(*) FROM sqlite_master"):
-                    for statement in _SCHEMA:
-                        self._db.execute(statement)
-        marks = number("PRAGMA application_id"), number("PRAGMA user_version")
-        if marks != (_APPLICATION, _VERSION):
+        except ColiftError:
             self._db.close()
-            raise ColiftError(f"{self.path}: not a file of campaign results of this version")
-        self._db.execute("PRAGMA journal_mode = WAL")
-        self._db.execute("PRAGMA synchronous = FULL")
-        self._db.execute("PRAGMA foreign_keys = ON")
+            raise
+
+    def _check(self) -> int:
+        """The file's version, if it is a campaign's."""
+        mark, version = (
+            int(self._db.execute(f"PRAGMA {name}").fetchone()[0])
+            for name in ("application_id", "user_version")
+        )
+        if mark != _APPLICATION:
+            raise ColiftError(f"{self.path}: not a file of campaign results")
+        if not 1 <= version <= _VERSION:
+            raise ColiftError(
+                f"{self.path}: not a file of campaign results that this colift knows: it has format "
+                f"{version}, known are 1 to {_VERSION}"
+            )
+        return version
 
     def __enter__(self) -> Store:
         return self
@@ -138,7 +159,7 @@ class Store:
         values = (
             job.key, json.dumps(job.mission), job.code, result.outcome, result.error, result.wall_time,
             result.worker, json.dumps(result.versions), recording and str(recording),
-            datetime.now(UTC).isoformat(timespec="seconds"),
+            datetime.now(UTC).isoformat(timespec="seconds"), result.level, json.dumps(result.reasons),
         )  # fmt: skip
         with self._transaction():
             self._db.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(values))})", values)
@@ -154,28 +175,51 @@ class Store:
             "json_extract(mission, '$.timing.duration'), wall_time FROM runs WHERE error = ''"
         ).fetchall()
 
-    def rows(self, keys: Iterable[str] | None = None) -> list[Row]:
-        """Every case that was asked for (of these keys), in that order; NaN where a metric is."""
+    def rows(self, planned: Iterable[tuple[Labels, Job]] | None = None) -> list[Row]:
+        """Every case that was asked for, or these in their order, each once; NaN where a metric is."""
         numbers: dict[str, dict[str, float]] = {}
         for key, name, value in self._db.execute("SELECT * FROM metrics"):
             numbers.setdefault(key, {})[name] = float("nan") if value is None else value
-        wanted = None if keys is None else set(keys)
+        verdict = "level, reasons" if self._version > 1 else "'', '[]'"
         found = self._db.execute(
-            "SELECT labels, key, error, outcome, wall_time, worker, code, recording, finished "
-            "FROM cases LEFT JOIN runs USING (key) ORDER BY cases.rowid"
+            f"SELECT labels, key, {verdict}, error, outcome, wall_time, worker, code, recording, "
+            "finished FROM cases LEFT JOIN runs USING (key) ORDER BY cases.rowid"
         )
-        rows = []
-        for labels, key, error, outcome, *rest in found:
-            if wanted is None or key in wanted:
-                status = "missing" if error is None else "failed" if error else "flown"
-                facts = dict(zip(_FACTS, (key, status, outcome, error, *rest), strict=True))
-                rows.append({**json.loads(labels), **facts, **numbers.get(key, {})})
-        return rows
+        rows: dict[tuple[str, str], Row] = {}
+        for labels, key, level, reasons, error, *rest in found:
+            status = "missing" if error is None else "failed" if error else "flown"
+            said = "; ".join(json.loads(reasons or "[]"))
+            facts = dict(zip(FACTS, (key, status, level or "", said, error, *rest), strict=True))
+            rows[labels, key] = {**json.loads(labels), **facts, **numbers.get(key, {})}
+        if planned is None:
+            return list(rows.values())
+        asked = dict.fromkeys((json.dumps(labels), job.key) for labels, job in planned)
+        return [rows[case] for case in asked]
 
 
-_FACTS = (
-    "key", "status", "outcome", "error", "wall_time_s", "worker", "code", "recording", "finished",
+FACTS = (
+    "key", "status", "level", "reasons", "error", "outcome", "wall_time_s", "worker", "code", "recording",
+    "finished",
 )  # fmt: skip
+"""Columns of a row between its labels and its metrics; ``level`` and ``reasons`` are the verdict's."""
+
+
+def _make(path: Path) -> None:
+    """An empty file of results unless there is a file, seen by others whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.exists():
+        return
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".campaign-") as folder:
+        new = Path(folder) / path.name
+        with contextlib.closing(sqlite3.connect(new, isolation_level=None)) as database:
+            for statement in _SCHEMA:
+                database.execute(statement)
+        try:
+            os.link(new, path)
+        except FileExistsError:
+            pass  # another process was faster
+        except OSError:  # a file system without links
+            os.replace(new, path)
 
 
 def write_csv(rows: list[Row], path: Path) -> None:

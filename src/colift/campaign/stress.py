@@ -7,28 +7,31 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from colift.actuation.motors import Motors
+from colift.campaign.judge import fate, held
 from colift.campaign.plan import Case, Labels, without_seed
 from colift.errors import ColiftError, UnknownNameError
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
-from colift.mission.schema import Bound
+from colift.part import LAYERS
 from colift.survival import FAULTS, WHOLE_TEAM
-from colift.verdict import Judgement, judgements
 
 Overrides = dict[str, Any]
 Row = Mapping[str, Any]
 
 UNTOUCHED: Overrides = {
-    "truth": {}, "sensing": {"kind": "ideal"}, "link": {"kind": "ideal"},
-    "actuation": {"kind": "ideal"}, "disturbance": [], "fault": [],
+    "truth": {}, "sensing": {"kind": "ideal"}, "link": {"kind": "ideal"}, "disturbance": [], "fault": [],
 }  # fmt: skip
 """A world in which nothing goes wrong. Every condition is this with something changed."""
+
+ROTOR_DRAG = 0.02
+"""Of the drones in every wind, s/m: 4 % of the thrust at 2 m/s, a fifth at 10 m/s."""
 
 WIND = [
     {"kind": "wind", "speed": 10.0, "heading_deg": 30.0},
     {"kind": "dryden", "speed": 10.0, "heading_deg": 30.0},
     {"kind": "gust", "peak": [4.0, 3.0, 1.0], "at": 3.0, "every": 3.0},
-    {"kind": "drag"},
+    {"kind": "drag", "rotor_drag": ROTOR_DRAG},
 ]
 LATE = {f"{sensor}_delay": 0.02 for sensor in ("load", "tracking", "attitude", "rates")}
 EXACT = {
@@ -54,13 +57,6 @@ WEATHER: dict[str, Overrides] = {
 
 FAULT_AT = 6.0
 """When the fault of a condition happens, s; at the drone of the seed's number."""
-
-DEFAULT_CRITERIA: dict[str, dict[str, float]] = {
-    "tracking_max_m": {"max": 0.15},
-    "min_angle_deg": {"min": 20.0},
-    "min_height_m": {"min": 0.0},
-}
-"""For a mission that has no criteria of its own."""
 
 
 def condition_names() -> list[str]:
@@ -119,8 +115,9 @@ def cases(
 ) -> list[Case]:
     """Every flight; an empty list of allocators or plants stands for the mission's own.
 
-    The condition replaces the mission's truth, sensing, link, actuation, disturbances and faults; ``changes``
-    come last. The allocator that the mission names keeps its settings there.
+    The condition replaces the mission's truth, sensing, link, disturbances and faults, and ideal rotors by
+    real ones, see :func:`motors`; ``changes`` come last. The allocator that the mission names keeps its
+    settings there. Judged is by the mission's criteria and the defaults of every verdict.
     """
     changes = without_seed(changes)
     for layer, several in (("allocation", allocators), ("plant", plants)):
@@ -129,14 +126,13 @@ def cases(
             raise ColiftError(f"{layer}.kind is what {option} varies; change fields of it by name")
     own = {path: value for path, value in changes.items() if path.partition(".")[0] in _MISSIONS}
     loaded = load_mission(mission, own)
-    criteria = loaded.criteria or DEFAULT_CRITERIA
     found = []
     for seed in seeds:
         for condition in conditions:
-            around = world(condition, seed, loaded.drones.count) | {"seed": seed}
-            around["criteria"] = {
-                name: _bound(name, bound, condition) for name, bound in criteria.items()
-            }
+            around = world(condition, seed, loaded.drones.count) | motors(loaded) | {"seed": seed}
+            most = loaded.criteria["lost_drones"].max if "lost_drones" in loaded.criteria else None
+            if most is not None and _parts(condition)[0]:
+                around["criteria.lost_drones.max"] = max(most, 1.0)  # the one that breaks may leave
             for allocator in allocators or [loaded.kinds["allocation"]]:
                 for plant in plants or [loaded.kinds["plant"]]:
                     kinds = {"allocation.kind": allocator, "plant.kind": plant}
@@ -147,58 +143,29 @@ def cases(
     return found
 
 
+def motors(mission: Mission) -> Overrides:
+    """Real motors in place of ideal rotors, their lag told to every controller that asks for one.
+
+    A mission that has motors keeps them, and what its controllers are told of them.
+    """
+    if type(mission.actuation).has_motors:
+        return {}
+    real = Motors()
+    told = {
+        f"{layer}.lag": real.time_constant
+        for layer in LAYERS
+        if getattr(getattr(mission, layer), "lag", None) == 0.0
+    }
+    return {"actuation": {"kind": "motors"}, **told}
+
+
 _MISSIONS = ("allocation", "plant", "drones")
 """Sections that a condition leaves alone and that decide which flights there are."""
 
 
-def _bound(name: str, bound: Bound | dict[str, float], condition: str) -> dict[str, Any]:
-    plain = bound.model_dump(exclude_none=True) if isinstance(bound, Bound) else dict(bound)
-    if name == "lost_drones" and _parts(condition)[0] and "max" in plain:
-        plain["max"] = max(plain["max"], 1.0)  # the one that breaks may leave
-    return plain
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """How one flight stands against its criteria.
-
-    Attributes
-    ----------
-    row : mapping
-        The flight, as the campaign keeps it.
-    mission : Mission
-        As flown.
-    judged : list of Judgement
-        The criteria; empty for a flight that ended in an error.
-
-    """
-
-    row: Row
-    mission: Mission
-    judged: list[Judgement]
-
-    @property
-    def passed(self) -> bool:
-        ended = self.row["status"] == "flown" and self.row["outcome"] == "completed"
-        return ended and all(each.holds for each in self.judged)
-
-    @property
-    def reason(self) -> str:
-        """Why it failed, in words; empty where it passed."""
-        if self.row["status"] != "flown":
-            return str(self.row["error"])
-        ended = [] if self.row["outcome"] == "completed" else [str(self.row["outcome"])]
-        return "; ".join([*ended, *(str(each) for each in self.judged if not each.holds)])
-
-
-def verdicts(rows: Iterable[Row], missions: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
-    """Judge rows; ``missions`` has the resolved mission of each key."""
-    found = []
-    for row in rows:
-        mission = load_mission(missions[row["key"]])
-        judged = judgements(mission, row) if row["status"] == "flown" else []
-        found.append(Verdict(row, mission, judged))
-    return found
+def reason(row: Row) -> str:
+    """Why a flight did not pass, in words; empty where it did."""
+    return "" if held(row) else str(row.get("error") or row["reasons"])
 
 
 @dataclass(frozen=True)
@@ -206,36 +173,41 @@ class Cell:
     """All seeds of one condition, allocator and plant."""
 
     passed: int
+    lost: int
+    """Flights that lost the load or the team, or ended in an error."""
     flown: int
     worst_m: float
-    """Largest distance of the load from its reference in any of them; infinite if one did not end well."""
+    """Largest distance of the load from its reference in any of the others; NaN without others."""
     least_deg: float
-    """Smallest angle between two cables in any of them."""
+    """Smallest angle between two cables in any of the others."""
+    slack_s: float
+    """Longest time without tension, summed over the cables, in any of the others."""
 
 
-def matrix(found: Sequence[Verdict]) -> dict[str, dict[tuple[str, str], Cell]]:
+def matrix(rows: Sequence[Row]) -> dict[str, dict[tuple[str, str], Cell]]:
     """Cells by condition, then by allocator and plant, in the order in which they were asked for."""
-    groups: dict[str, dict[tuple[str, str], list[Verdict]]] = {}
-    for verdict in found:
-        row = verdict.row
-        cell = groups.setdefault(str(row["condition"]), {})
-        cell.setdefault((str(row["allocator"]), str(row["plant"])), []).append(verdict)
+    groups: dict[str, dict[tuple[str, str], list[Row]]] = {}
+    for row in rows:
+        cells = groups.setdefault(str(row["condition"]), {})
+        cells.setdefault((str(row["allocator"]), str(row["plant"])), []).append(row)
     return {
         condition: {place: _cell(each) for place, each in cells.items()}
         for condition, cells in groups.items()
     }
 
 
-def _cell(group: Sequence[Verdict]) -> Cell:
-    def value(verdict: Verdict, name: str) -> float:
-        flown = verdict.row["status"] == "flown" and verdict.row["outcome"] == "completed"
-        return float(verdict.row[name]) if flown else math.nan
+def _cell(group: Sequence[Row]) -> Cell:
+    ended = [row for row in group if fate(row) in ("held", "missed")]
 
-    errors = [value(verdict, "tracking_max_m") for verdict in group]
-    angles = [value(verdict, "min_angle_deg") for verdict in group]
+    def most(name: str, sign: float = 1.0) -> float:
+        values = [sign * float(row[name]) for row in ended if not math.isnan(row[name])]
+        return sign * max(values, default=math.nan)
+
     return Cell(
-        passed=sum(verdict.passed for verdict in group),
+        passed=sum(map(held, group)),
+        lost=len(group) - len(ended),
         flown=len(group),
-        worst_m=math.inf if any(map(math.isnan, errors)) else max(errors),
-        least_deg=min((angle for angle in angles if not math.isnan(angle)), default=math.nan),
+        worst_m=most("tracking_max_m"),
+        least_deg=most("min_angle_deg", -1.0),
+        slack_s=most("slack_time_s"),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from colift.campaign import judge
 from colift.campaign.plan import Case, Label, without_seed
 from colift.errors import MissionError, Problem
 from colift.mission.load import layered, parse_override
@@ -117,25 +119,60 @@ METRICS = {
 class Point:
     """The flights of one combination of values.
 
-    ``spread`` holds mean, least and largest of each metric over the seeds that were flown to the end.
+    Attributes
+    ----------
+    values : tuple
+        Of the fields, in their order.
+    fates : mapping
+        Number of flights by what became of them, see :func:`colift.campaign.judge.fate`.
+    reasons : list of str
+        What was wrong in flights that were not held, the most frequent first, each once.
+    spread : mapping
+        Mean, least and largest of each metric over the seeds whose flight went to its end without a loss.
+
     """
 
     values: tuple[Any, ...]
-    flights: int
-    completed: int
+    fates: Mapping[str, int]
+    reasons: list[str]
     spread: Mapping[str, tuple[float, float, float]]
+
+    @property
+    def flights(self) -> int:
+        return sum(self.fates.values())
+
+    @property
+    def held(self) -> int:
+        """Flights that kept every criterion."""
+        return self.fates.get("held", 0)
+
+    @property
+    def refused(self) -> bool:
+        """Whether there can be no such flight."""
+        return self.fates.get("refused", 0) == self.flights
+
+    @property
+    def level(self) -> str:
+        """What the worst of its flights came to."""
+        return next((fate for fate in judge.WORST_FIRST if self.fates.get(fate)), "missing")
 
 
 def points(rows: Sequence[Mapping[str, Any]], overs: Sequence[Over]) -> list[Point]:
-    """One summary a combination of values, in the order flown."""
+    """One summary a combination of values, in the order asked for."""
     grouped: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
         grouped.setdefault(tuple(row[over.path] for over in overs), []).append(row)
     found = []
     for values, flights in grouped.items():
-        good = [row for row in flights if row["outcome"] == "completed"]
-        spread = {name: _spread([float(row[name]) for row in good]) for name in METRICS}
-        found.append(Point(values, len(flights), len(good), spread))
+        fates = Counter(map(judge.fate, flights))
+        ended = [row for row in flights if judge.fate(row) in ("held", "missed")]
+        spread = {name: _spread([float(row[name]) for row in ended]) for name in METRICS}
+        wrong = Counter(
+            str(row.get("error") or row.get("reasons") or row.get("outcome"))
+            for row in flights
+            if not judge.held(row)
+        )
+        found.append(Point(values, fates, [text for text, _ in wrong.most_common()], spread))
     return found
 
 

@@ -14,6 +14,7 @@ import traceback
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Protocol
@@ -32,11 +33,13 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a job; ``error`` is empty where it was flown."""
+    """What became of a job; ``error`` is empty where it was flown, which then has a verdict."""
 
     key: str
     error: str = ""
     outcome: str = ""
+    level: str = ""
+    reasons: list[str] = field(default_factory=list)
     metrics: dict[str, float] = field(default_factory=dict)
     wall_time: float = 0.0
     worker: str = ""
@@ -61,6 +64,8 @@ def fly(job: Job) -> Result:
         result = Result(
             job.key,
             outcome=flown.recording.outcome,
+            level=flown.verdict.level,
+            reasons=flown.verdict.reasons,
             metrics=flown.metrics,
             versions=flown.recording.versions,
             recording=_file_of(flown.recording) if job.keep else None,
@@ -150,7 +155,8 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, end = context.Pipe()
         self._process = context.Process(target=_serve, args=(end,), daemon=True)
-        with _environment(_ONE_THREAD):
+        resource_tracker.ensure_running()  # here, for it lets SIGINT through again
+        with _environment(_ONE_THREAD), _uninterrupted():
             self._process.start()
         end.close()
 
@@ -164,11 +170,20 @@ class _Worker:
 
 def _serve(pipe: Connection) -> None:
     """Fly what comes through the pipe until its other end is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asks
     os.dup2(2, 1)  # what a part prints must not come between the lines of --json
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
             pipe.send(fly(pipe.recv()))
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Processes that are started here never see Ctrl-C, which is for the process that asks."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager

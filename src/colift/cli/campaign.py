@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,11 +14,11 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
-from colift.cli.base import err, out
+from colift.cli.base import EXIT_ERROR, EXIT_FAILED, EXIT_INTERRUPTED, EXIT_LOST, err, out
 
 if TYPE_CHECKING:
     from colift.campaign.engine import Outcome, Progress
-    from colift.campaign.plan import Plan
+    from colift.campaign.plan import Case, Plan, Refused
 
 FILE = "campaign.sqlite"
 """Name of the file of results in a command's folder."""
@@ -45,6 +45,13 @@ Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Fly on the workers of this Dask scheduler instead."),
 ]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict",
+        help="Exit code 3 if a flight lost the load or the team, 4 if one missed a criterion, 1 if one could not be set up.",
+    ),
+]  # fmt: skip
 RetryFailed = Annotated[bool, typer.Option("--retry-failed", help="Fly again what failed before.")]
 KeepRecordings = Annotated[
     bool, typer.Option("--recordings", help="Keep the recording of every new flight as well.")
@@ -86,18 +93,27 @@ def fly(
     retry_failed: bool,
     recordings: bool = False,
 ) -> Outcome:
-    """Fly what the folder does not hold yet, with a bar of flights."""
+    """Fly what the folder does not hold yet, with a bar of flights; on Ctrl-C say how to go on."""
     from colift.campaign import engine
 
-    with flights(title) as advance:
-        return engine.run(
-            planned,
-            engine.Options(
-                file=folder / FILE, workers=workers, scheduler=scheduler,
-                retry_failed=retry_failed, progress=advance,
-                recordings=folder / "recordings" if recordings else None,
-            ),
+    try:
+        with flights(title) as advance:
+            return engine.run(
+                planned,
+                engine.Options(
+                    file=folder / FILE, workers=workers, scheduler=scheduler,
+                    retry_failed=retry_failed, progress=advance,
+                    recordings=folder / "recordings" if recordings else None,
+                ),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        kept, wanted = engine.kept(planned, folder / FILE)
+        err.print(
+            f"interrupted: {kept} of {wanted} flights are kept; the others are flown by\n"
+            f"  {escape(resume_line(folder))}",
+            highlight=False, soft_wrap=True,
         )  # fmt: skip
+        raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def duration(seconds: float) -> str:
@@ -120,6 +136,50 @@ def export(rows: Sequence[dict[str, Any]], csv: Path | None, parquet: Path | Non
 def command_line() -> str:
     """The command as it was given."""
     return shlex.join(["colift", *sys.argv[1:]])
+
+
+def resume_line(folder: Path) -> str:
+    """The command that goes on with what it has begun in a folder."""
+    given = any(word == "--out" or word.startswith("--out=") for word in sys.argv[1:])
+    return command_line() if given else f"{command_line()} --out {shlex.quote(str(folder))}"
+
+
+def say_refused(refused: Sequence[Refused]) -> None:
+    """Say which cases are left out because they cannot be flown."""
+    from colift.campaign.plan import problems
+
+    if not refused:
+        return
+    err.print(f"{len(refused)} flights cannot be set up and are left out:", highlight=False)
+    for problem in problems(refused):
+        err.print(f"  {escape(str(problem))}", highlight=False, soft_wrap=True)
+
+
+def in_order(
+    cases: Sequence[Case], flown: Sequence[dict[str, Any]], refused: Sequence[Refused]
+) -> list[dict[str, Any]]:
+    """The rows of all cases, flown and refused, in the order of the cases, each once."""
+    rows = [*flown, *(each.row for each in refused)]
+    names = dict.fromkeys(name for case in cases for name in case.labels)
+
+    def place(labels: Mapping[str, Any]) -> tuple[Any, ...]:
+        return tuple(labels.get(name) for name in names)
+
+    order = {place(case.labels): k for k, case in reversed(list(enumerate(cases)))}
+    return sorted(rows, key=lambda row: order[place(row)])
+
+
+def end(rows: Sequence[dict[str, Any]], strict: bool) -> None:
+    """End the command with the exit code of its flights; what criteria say counts if ``strict``."""
+    from colift.campaign.judge import fate
+
+    fates = {fate(row) for row in rows}
+    if "failed" in fates or (strict and "refused" in fates):
+        raise typer.Exit(EXIT_ERROR)
+    if strict and "lost" in fates:
+        raise typer.Exit(EXIT_LOST)
+    if strict and "missed" in fates:
+        raise typer.Exit(EXIT_FAILED)
 
 
 def show_end(outcome: Outcome, files: dict[str, Path]) -> None:

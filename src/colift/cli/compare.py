@@ -9,7 +9,6 @@ import typer
 from rich.markup import escape
 
 from colift.cli.base import (
-    EXIT_ERROR,
     Json,
     Sets,
     With,
@@ -30,10 +29,14 @@ from colift.cli.campaign import (
     RetryFailed,
     Scheduler,
     Seeds,
+    Strict,
     Workers,
     command_line,
+    end,
     export,
     fly,
+    in_order,
+    say_refused,
     show_end,
 )
 
@@ -56,6 +59,12 @@ def compare(
     spread: Annotated[
         bool, typer.Option(help="Sweep what each allocator spends on separation as well.")
     ] = True,
+    as_in_mission: Annotated[
+        bool,
+        typer.Option(
+            "--as-in-mission", help="The allocator that a mission names keeps its settings there."
+        ),
+    ] = False,
     sets: Sets = None,
     folder: Annotated[
         Path | None,
@@ -66,13 +75,15 @@ def compare(
     scheduler: Scheduler = None,
     retry_failed: RetryFailed = False,
     recordings: KeepRecordings = False,
+    strict: Strict = False,
     csv: Csv = None,
     parquet: Parquet = None,
     as_json: Json = False,
 ) -> None:
     """Fly every allocator on the same missions; say who is best at what, and what separation costs.
 
-    With --out DIR of an earlier, perhaps interrupted comparison, only what is missing is flown.
+    Each has its own default settings; --set safe.mu=0.3 changes that of one, --set allocation.mu=0.3 that of all. A
+    flight is held if it keeps every criterion of its mission to the end. With --out DIR of an earlier, perhaps interrupted comparison, only what is missing is flown.
 
     [bold]Examples[/bold]
 
@@ -85,7 +96,7 @@ def compare(
     with loading():
         from colift.campaign import compare as study
         from colift.campaign import judge
-        from colift.campaign.plan import Source, plan
+        from colift.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
         own = study.own_allocators(sources)
@@ -97,31 +108,41 @@ def compare(
             missions.split(",") if missions else study.QUICK_MISSIONS if quick else study.MISSIONS
         )
         flown_seeds = range(first_seed, first_seed + seeds)
-        planned = plan(study.cases(able, chosen, flown_seeds, changes, spread=spread), sources)
+        cases = study.cases(
+            able, chosen, flown_seeds, changes, spread=spread, as_in_mission=as_in_mission
+        )
+        planned, refused = sift(cases, sources)
+    say_refused(refused)
     target = folder or new_folder("compare")
     outcome = fly(
         "Comparing", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
+    from colift.math.shares import interval
     from colift.report.campaign import contest_table, write_contest
 
-    contest = [row for row in outcome.rows if row["study"] == study.CONTEST]
+    rows = in_order(cases, outcome.rows, refused)
+    contest = [row for row in rows if row["study"] == study.CONTEST]
     field = judge.contestants(contest)
     said = judge.words(field, judge.criteria_of(contest))
+    notes = study.protocol(chosen, flown_seeds, changes, as_in_mission=as_in_mission)
     files = {
-        "report": write_contest(
-            outcome.rows, target, said, command=command_line(), notes=study.protocol(seeds, changes)
-        ),
+        "report": write_contest(rows, target, said, command=command_line(), notes=notes),
         "results": target / FILE,
     }
     result = {
         "allocators": {
-            c.name: {"flights": c.flights, "held": c.held, "lost": c.lost, "failed": c.failed}
-            | {"values": dict(c.values)}
+            c.name: {
+                "flights": c.flights, "held": c.held, "interval": interval(c.held, c.flights),
+                "missed": c.missed, "lost": c.lost, "failed": c.failed, "refused": c.refused,
+                "values": dict(c.values),
+            }
             for c in field
         },
         "missions": list(chosen),
         "seeds": seeds,
+        "first_seed": first_seed,
+        "protocol": notes,
         "period_s": changes.get("timing.allocation", study.PERIOD),
         "words": said,
         "not_installed": missing,
@@ -129,9 +150,9 @@ def compare(
         "wall_time_s": outcome.wall_time,
         "workers": outcome.workers,
         "files": {name: str(path) for name, path in files.items()},
-    }
+    }  # fmt: skip
     save_json(target / "compare.json", result)
-    export(outcome.rows, csv, parquet)
+    export(rows, csv, parquet)
     if as_json:
         emit(result)
     else:
@@ -145,5 +166,4 @@ def compare(
         for sentence in missing:
             out.print(f"Not compared: {escape(sentence)}", highlight=False)
         show_end(outcome, files)
-    if any(row["status"] == "failed" for row in outcome.rows):
-        raise typer.Exit(EXIT_ERROR)
+    end(rows, strict)

@@ -10,8 +10,6 @@ import typer
 from rich.markup import escape
 
 from colift.cli.base import (
-    EXIT_ERROR,
-    EXIT_FAILED,
     Json,
     Sets,
     With,
@@ -30,8 +28,10 @@ from colift.cli.campaign import (
     Parquet,
     RetryFailed,
     Scheduler,
+    Strict,
     Workers,
     command_line,
+    end,
     export,
     fly,
     show_end,
@@ -68,7 +68,7 @@ def stress(
     replays: Annotated[
         int, typer.Option(min=0, max=1000, help="Most failing flights that get a replay.")
     ] = 12,
-    strict: Annotated[bool, typer.Option(help="Exit code 4 if any flight fails.")] = False,
+    strict: Strict = False,
     names: Annotated[bool, typer.Option("--list", help="Name the conditions and end.")] = False,
     extra: With = None,
     workers: Workers = None,
@@ -80,9 +80,10 @@ def stress(
 ) -> None:
     """Fly one mission under everything that can go wrong, against its criteria.
 
-    Each condition replaces the mission's world: wind, delay, noise, wrong masses, faults. A fault happens in noise
-    and delay, or in the weather named behind it. What fails gets a mission file that flies it again and a replay, both linked in the report. With --out DIR of an
-    earlier, perhaps interrupted campaign, only what is missing is flown.
+    Each condition replaces the mission's world: wind, delay, noise, wrong masses, faults; ideal rotors become real
+    motors. A fault happens in noise and delay, or in the weather named behind it. What fails gets a mission file
+    that flies it again and a replay, both linked in the report. With --out DIR of an earlier, perhaps interrupted
+    campaign, only what is missing is flown.
 
     [bold]Examples[/bold]
 
@@ -118,49 +119,55 @@ def stress(
         "Stressing", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed,
     )  # fmt: skip
+    from colift.campaign.judge import held
+    from colift.math.shares import interval, text
     from colift.report.stress import matrix_tables, write_stress
 
+    rows = outcome.rows
     missions = {job.key: job.mission for _, job in planned}
-    found = study.verdicts(outcome.rows, missions)
     files = {
-        "report": write_stress(found, target, command=command_line(), replays=replays),
+        "report": write_stress(rows, missions, target, command=command_line(), replays=replays),
         "results": target / FILE,
     }
-    passed = sum(verdict.passed for verdict in found)
+    passed = sum(map(held, rows))
     result = {
         "mission": mission,
+        "command": command_line(),
+        "seeds": [first_seed, first_seed + seeds - 1],
         "passed": passed,
-        "flights": len(found),
+        "flights": len(rows),
         "conditions": {
             condition: [
                 {
-                    "allocator": allocator, "plant": plant, "passed": cell.passed,
-                    "flights": cell.flown, "worst_m": cell.worst_m, "least_deg": cell.least_deg,
+                    "allocator": allocator, "plant": plant, "passed": cell.passed, "lost": cell.lost,
+                    "flights": cell.flown, "interval": interval(cell.passed, cell.flown),
+                    "worst_m": cell.worst_m, "least_deg": cell.least_deg, "slack_s": cell.slack_s,
                 }
                 for (allocator, plant), cell in cells.items()
             ]
-            for condition, cells in study.matrix(found).items()
+            for condition, cells in study.matrix(rows).items()
         },
-        "failing": [{**_labels(each.row), "reason": each.reason} for each in found if not each.passed],
+        "failing": [
+            {**_labels(row), "level": row["level"], "reason": study.reason(row)}
+            for row in rows
+            if not held(row)
+        ],
         "flown": outcome.flown,
         "wall_time_s": outcome.wall_time,
         "workers": outcome.workers,
         "files": {name: str(path) for name, path in files.items()},
     }  # fmt: skip
     save_json(target / "stress.json", result)
-    export(outcome.rows, csv, parquet)
+    export(rows, csv, parquet)
     if as_json:
         emit(result)
     else:
         show_tables(
-            (f"{mission}, {title}", header, lines) for title, header, lines in matrix_tables(found)
+            (f"{mission}, {title}", header, lines) for title, header, lines in matrix_tables(rows)
         )
-        out.print(f"{passed} of {len(found)} flights pass.")
+        out.print(f"{text(passed, len(rows))} flights pass.", highlight=False)
         show_end(outcome, files)
-    if any(row["status"] == "failed" for row in outcome.rows):
-        raise typer.Exit(EXIT_ERROR)
-    if strict and passed < len(found):
-        raise typer.Exit(EXIT_FAILED)
+    end(rows, strict)
 
 
 def _several(text: str | None) -> list[str]:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from colift.cli.base import (
-    EXIT_ERROR,
     Json,
     Sets,
     With,
@@ -16,6 +16,7 @@ from colift.cli.base import (
     emit,
     loading,
     new_folder,
+    out,
     show_tables,
 )
 from colift.cli.campaign import (
@@ -27,10 +28,14 @@ from colift.cli.campaign import (
     RetryFailed,
     Scheduler,
     Seeds,
+    Strict,
     Workers,
     command_line,
+    end,
     export,
     fly,
+    in_order,
+    say_refused,
     show_end,
 )
 
@@ -60,13 +65,14 @@ def sweep(
     scheduler: Scheduler = None,
     retry_failed: RetryFailed = False,
     recordings: KeepRecordings = False,
+    strict: Strict = False,
     csv: Csv = None,
     parquet: Parquet = None,
     as_json: Json = False,
 ) -> None:
     """Fly one mission over values of any of its fields, and over seeds; table, plots and all numbers.
 
-    With --out DIR of an earlier, perhaps interrupted sweep, only what is missing is flown.
+    Every flight has the verdict that `colift run` would give it. Values that cannot be flown are shown and left out. With --out DIR of an earlier, perhaps interrupted sweep, only what is missing is flown.
 
     [bold]Examples[/bold]
 
@@ -77,39 +83,47 @@ def sweep(
 
     with loading():
         from colift.campaign import sweep as study
-        from colift.campaign.plan import Source, plan
+        from colift.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
         overs = [study.parse_over(text) for text in over]
         changes = parse_overrides(sets)
         flown_seeds = range(first_seed, first_seed + seeds)
-        planned = plan(study.cases(mission, overs, flown_seeds, changes), sources)
+        cases = study.cases(mission, overs, flown_seeds, changes)
+        planned, refused = sift(cases, sources)
+    say_refused(refused)
     target = folder or new_folder("sweep")
     outcome = fly(
         f"Sweeping {mission}", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
-    from colift.report.campaign import sweep_tables, write_sweep
+    from colift.math.shares import interval
+    from colift.report.campaign import not_held, sweep_tables, write_sweep
     from colift.report.campaign_figures import Swept
 
-    swept = Swept(outcome.rows, overs)
+    rows = in_order(cases, outcome.rows, refused)
+    swept = Swept(rows, overs)
     title = f"{mission} over {', '.join(o.path for o in overs)}"
     files = {
         "report": write_sweep(title, swept, target, command=command_line()),
         "results": target / FILE,
     }
-    export(outcome.rows, csv, parquet)
+    export(rows, csv, parquet)
     if as_json:
         emit(
             {
                 "mission": mission,
                 "over": {o.path: list(o.values) for o in overs},
                 "seeds": seeds,
+                "first_seed": first_seed,
                 "points": [
                     {
                         "values": dict(zip((o.path for o in overs), point.values, strict=True)),
                         "flights": point.flights,
-                        "completed": point.completed,
+                        "fates": dict(point.fates),
+                        "held": point.held,
+                        "interval": interval(point.held, point.flights),
+                        "reasons": point.reasons,
                         "metrics": {
                             name: dict(zip(("mean", "min", "max"), numbers, strict=True))
                             for name, numbers in point.spread.items()
@@ -124,6 +138,7 @@ def sweep(
         )
     else:
         show_tables(sweep_tables(swept))
+        for sentence in not_held(swept):
+            out.print(f"- {escape(sentence)}", highlight=False, soft_wrap=True)
         show_end(outcome, files)
-    if any(row["status"] == "failed" for row in outcome.rows):
-        raise typer.Exit(EXIT_ERROR)
+    end(rows, strict)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from colift.campaign import judge
+from colift.math import shares
 from colift.metrics import all_metrics
 from colift.recording import atomic_path, versions
 from colift.report import html
@@ -22,9 +23,9 @@ Table = tuple[list[str], list[list[str]]]
 
 def contest_table(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> Table:
     """One line an allocator: flights held and these criteria over them."""
-    header = ["allocator", "held", *(_title(criterion) for criterion in criteria)]
+    header = ["allocator", "held (95 %)", *(_title(criterion) for criterion in criteria)]
     lines = [
-        [c.name, f"{c.held}/{c.flights}", *(k.text(c.values[k.metric]) for k in criteria)]
+        [c.name, shares.text(c.held, c.flights), *(k.text(c.values[k.metric]) for k in criteria)]
         for c in judge.contestants(rows)
     ]
     return header, lines
@@ -72,7 +73,8 @@ def write_contest(
     criteria = judge.criteria_of(contest)
     field = judge.contestants(contest)
     missions = list(dict.fromkeys(str(row["mission"]) for row in contest))
-    drawings = draw(CONTEST, rows)
+    # Figures are of flights that were held, which here and there are none.
+    drawings = draw(CONTEST, rows) if any(map(judge.held, contest)) else []
     body = [
         "<header><h1>Allocators compared</h1>",
         f'<p class="soft">{escape(" ".join(notes))}</p></header>',
@@ -81,8 +83,10 @@ def write_contest(
                 f"{len(field)} allocators",
                 f"{len(missions)} mission{'s' * (len(missions) != 1)}",
                 f"{len(contest)} flights",
+                f"{sum(c.held for c in field)} held",
+                f"{sum(c.missed for c in field)} missed a criterion",
                 f"{sum(c.lost for c in field)} lost",
-                f"{sum(c.failed for c in field)} failed",
+                f"{sum(c.failed + c.refused for c in field)} not flown",
             ]
         ),
         "<h2>In words</h2>",
@@ -91,21 +95,18 @@ def write_contest(
         f'<p class="soft">{escape(_HELD)}</p>',
         *_grouped_tables(contest, criteria),
         "<h2>Figures</h2>",
-        *map(html.figure, drawings),
+        *(map(html.figure, drawings) if drawings else ['<p class="soft">No flight was held.</p>']),
         "<h2>Mission by mission</h2>",
     ]
     for mission in missions:
         own = [row for row in contest if row["mission"] == mission]
         body += [f"<h3>{escape(mission)}</h3>", _html_table(*contest_table(own, criteria))]
     body += ["<h2>How the numbers are made</h2>", _rules(criteria)]
-    body += [*_failures(contest), *provenance(command)]
+    body += [*_failures(rows), *provenance(command)]
     return _write(folder, "Allocators compared", body, drawings)
 
 
-_HELD = (
-    "Over the flights that were held: to the end, with the load never more than "
-    f"{judge.LOST:g} m off its reference."
-)
+_HELD = "Over the flights that were held: to the end, every criterion kept. The share of them has its exact 95 % interval."
 
 
 def _rules(criteria: Sequence[judge.Criterion]) -> str:
@@ -125,11 +126,13 @@ def write_sweep(title: str, swept: Swept, folder: Path, *, command: str) -> Path
     drawings = draw(SWEEP, swept)
     body = [
         f"<header><h1>{escape(title)}</h1>",
-        '<p class="soft">Over the seeds; only flights that went to their end count.</p></header>',
+        '<p class="soft">Over the seeds. Held are flights that keep every criterion, with the exact 95 % interval of '
+        "their share; numbers are over those that lost neither load nor team.</p></header>",
         "<h2>Figures</h2>",
         *map(html.figure, drawings),
         "<h2>Numbers</h2>",
         *(f"<h3>{name}</h3>{_html_table(head, rows)}" for name, head, rows in sweep_tables(swept)),
+        *_points(swept),
         *_failures(swept.rows),
         *provenance(command),
     ]
@@ -142,8 +145,9 @@ def sweep_tables(swept: Swept) -> list[tuple[str, list[str], list[list[str]]]]:
     paths = [over.path for over in swept.overs]
     units = {metric.name: metric.unit for metric in all_metrics()}
     heads = [f"{words} ({units[name]})" for name, words in swept.metrics.items()]
-    header = [*(leaves if len(set(leaves)) == len(leaves) else paths), "done", *heads]
+    names = leaves if len(set(leaves)) == len(leaves) else paths
     several = any(point.flights > 1 for point in swept.points)
+    header = [*names, "held (95 %)" if several else "verdict", *heads]
     titles = ("Mean", "Least", "Largest") if several else ("Flights",)
     tables = []
     for k, title in enumerate(titles):
@@ -151,9 +155,35 @@ def sweep_tables(swept: Swept) -> list[tuple[str, list[str], list[list[str]]]]:
         for point in swept.points:
             values = [f"{v:g}" if isinstance(v, float) else str(v) for v in point.values]
             numbers = [_number(point.spread[name][k]) for name in swept.metrics]
-            lines.append([*values, f"{point.completed}/{point.flights}", *numbers])
+            share = shares.text(point.held, point.flights) if several else point.level
+            lines.append([*values, "refused" if point.refused else share, *numbers])
         tables.append((title, header, lines))
     return tables
+
+
+def not_held(swept: Swept) -> list[str]:
+    """A sentence for each combination of values of which a flight was not held: how many, and why."""
+    said = []
+    for point in swept.points:
+        if point.held == point.flights:
+            continue
+        pairs = zip(swept.overs, point.values, strict=True)
+        where = ", ".join(f"{over.path} {value}" for over, value in pairs)
+        if point.refused:
+            said.append(f"{where}: cannot be flown: {point.reasons[0]}")
+            continue
+        counts = ", ".join(f"{count} {fate}" for fate, count in point.fates.items())
+        more = f" (and {len(point.reasons) - 1} more)" if len(point.reasons) > 1 else ""
+        said.append(f"{where}: {counts}: {point.reasons[0]}{more}")
+    return said
+
+
+def _points(swept: Swept) -> list[str]:
+    said = not_held(swept)
+    if not said:
+        return []
+    lines = "".join(f"<li>{escape(sentence)}</li>" for sentence in said)
+    return ["<h2>Not held</h2>", f"<ul>{lines}</ul>"]
 
 
 def _number(value: float) -> str:
@@ -168,11 +198,12 @@ def _html_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _failures(rows: Sequence[Row]) -> list[str]:
-    failed = [row for row in rows if row.get("status") == "failed"]
-    if not failed:
-        return []
-    lines = "\n".join(f"{_labels(row)}: {row['error']}" for row in failed)
-    return ["<h2>Errors</h2>", html.details(f"{len(failed)} flights ended in an error", lines)]
+    found = []
+    for fate, words in (("failed", "ended in an error"), ("refused", "could not be set up")):
+        those = [row for row in rows if judge.fate(row) == fate]
+        lines = "\n".join(f"{_labels(row)}: {row['error']}" for row in those)
+        found += [html.details(f"{len(those)} flights {words}", lines)] if those else []
+    return ["<h2>Errors</h2>", *found] if found else []
 
 
 def _labels(row: Row) -> str:

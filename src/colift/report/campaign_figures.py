@@ -48,12 +48,12 @@ def _contest(rows: Rows) -> list[Row]:
     "One mission, the start as given. Each line is one allocator over the values of the setting that buys "
     "separation with tension, named in the legend; its first and last value stand beside it. Large single "
     "marks are allocators without such a setting. Better is up and to the left; below the dashed line at "
-    "30 degrees drones come close. Medians over time: how a flight begins does not count. Flights that "
-    "were not held are left out.",
+    "30 degrees drones come close. Medians over time: how a flight begins does not count. Along the lines, flights "
+    "count that lost neither load nor team, whatever their angle; single marks are of flights that were held.",
 )
 def separation(rows: Rows) -> Figure:
     figure, (axes,) = style.grid(height=3.6, legend_rows=4)
-    swept = [row for row in rows if row.get("study") == "spread" and judge.held(row)]
+    swept = [r for r in rows if r.get("study") == "spread" and judge.fate(r) in ("held", "missed")]
     contest = _contest(rows)
     first = (swept or contest)[0]["mission"]
     for name, look in _looks(rows).items():

@@ -3,59 +3,83 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
-from colift.campaign.stress import Cell, Verdict, matrix
+from colift.campaign.judge import fate, held
+from colift.campaign.stress import Cell, Row, matrix, reason
+from colift.math import shares
+from colift.mission.load import load_mission
 from colift.recording import atomic_path
 from colift.report import html
 from colift.report.campaign import provenance
+from colift.verdict import criteria_of
 
 Table = tuple[str, list[str], list[list[str]]]
 """Title, header and rows, as text."""
 
 
-def matrix_tables(found: Sequence[Verdict]) -> list[Table]:
-    """One line a condition, one column an allocator, one table a plant; or a column a plant for one allocator."""
-    cells = matrix(found)
+def matrix_tables(rows: Sequence[Row]) -> list[Table]:
+    """One table an allocator and plant, a line a condition; before them, if there are several, one of shares."""
+    cells = matrix(rows)
     places = list(dict.fromkeys(place for row in cells.values() for place in row))
-    allocators, plants = (list(dict.fromkeys(names)) for names in zip(*places, strict=True))
-    if len(allocators) == 1:
-        tables = {allocators[0]: {(allocators[0], plant): plant for plant in plants}}
-    else:
-        tables = {plant: {(name, plant): name for name in allocators} for plant in plants}
-    return [
+    tables = [
         (
-            title,
-            ["condition", *columns.values()],
-            [
-                [condition, *(cell_text(row[place]) for place in columns)]
-                for condition, row in cells.items()
-            ],
+            ", ".join(place),
+            COLUMNS,
+            [[condition, *cell_texts(row[place])] for condition, row in cells.items()],
         )
-        for title, columns in tables.items()
+        for place in places
+    ]
+    if len(places) > 1:
+        header = ["condition", *(" ".join(place) for place in places)]
+        lines = [
+            [condition, *(shares.text(row[place].passed, row[place].flown) for place in places)]
+            for condition, row in cells.items()
+        ]
+        tables.insert(0, (SHARES, header, lines))
+    return tables
+
+
+COLUMNS = ["condition", "passed (95 %)", "lost", "distance (cm)", "angle (deg)", "slack (s)"]
+SHARES = "passed, with its 95 % interval"
+
+
+def cell_texts(cell: Cell) -> list[str]:
+    """A cell for people, as in :data:`COLUMNS`."""
+    return [
+        shares.text(cell.passed, cell.flown),
+        str(cell.lost),
+        _number(100.0 * cell.worst_m, 1),
+        _number(cell.least_deg, 0),
+        _number(cell.slack_s, 2),
     ]
 
 
-def cell_text(cell: Cell) -> str:
-    """Passed of flown, and the worst numbers."""
-    if math.isinf(cell.worst_m):
-        return f"{cell.passed}/{cell.flown}, lost"
-    return f"{cell.passed}/{cell.flown}, {100.0 * cell.worst_m:.1f} cm, {cell.least_deg:.0f}°"
+def _number(value: float, digits: int) -> str:
+    return "-" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def write_stress(
-    found: Sequence[Verdict], folder: Path, *, command: str, replays: int = 12
+    rows: Sequence[Row],
+    missions: Mapping[str, Mapping[str, Any]],
+    folder: Path,
+    *,
+    command: str,
+    replays: int = 12,
 ) -> Path:
     """Write ``report.html``, and in ``failing/`` a mission file and, for the first few, a replay of each failure.
 
     Parameters
     ----------
-    found : sequence of Verdict
+    rows : sequence of mappings
         Every flight.
+    missions : mapping
+        The resolved mission of each key.
     folder : Path
         Created if missing.
     command : str
@@ -64,73 +88,90 @@ def write_stress(
         Most replays; those flights are flown again here.
 
     """
-    failing = [verdict for verdict in found if not verdict.passed]
-    tables = matrix_tables(found)
+    failing = [row for row in rows if not held(row)]
+    lost = sum(fate(row) in ("lost", "failed") for row in rows)
+    tables = matrix_tables(rows)
+    first = load_mission(missions[rows[0]["key"]])
+    asked = {
+        repr([m[name] for name in ("criteria", "allocation", "events")]): m
+        for m in missions.values()
+    }
     criteria = {
-        f"{name} {bound}" for verdict in found for name, bound in verdict.mission.criteria.items()
+        f"{name} {bound}"
+        for mission in asked.values()
+        for name, bound in criteria_of(load_mission(mission)).items()
     }
     body = [
-        f"<header><h1>{escape(found[0].mission.name)} under stress</h1>",
+        f"<header><h1>{escape(first.name)} under stress</h1>",
         '<p class="soft">Each condition replaces the mission\'s world; the controllers are told of none of it.'
         "</p></header>",
         html.banner(
-            "warn" if failing else "pass",
-            f"{len(found) - len(failing)} of {len(found)} flights pass.",
+            "lost" if lost else "fail" if failing else "pass",
+            f"{shares.text(len(rows) - len(failing), len(rows))} flights pass.",
         ),
-        html.facts([f"{len(tables[0][2])} conditions", f"{len(found)} flights", *sorted(criteria)]),
+        html.facts([f"{len(tables[0][2])} conditions", f"{len(rows)} flights", *sorted(criteria)]),
         "<h2>Matrix</h2>",
-        '<p class="soft">Flights that pass, the largest distance of the load from its reference and the '
-        "smallest angle between two cables in any of them.</p>",
+        '<p class="soft">Flights that keep every criterion, with the exact 95 % interval of their share; flights that '
+        "lose the load or the team; and of the others the largest distance of the load from its reference, the "
+        "smallest angle between two cables and the longest time of slack, summed over the cables, in any.</p>",
         *(_matrix(*table) for table in tables),
         "<h2>Flights that fail</h2>",
-        _failures(failing, folder, replays),
+        _failures(failing, missions, folder, replays),
         *provenance(command),
     ]
     target = folder / "report.html"
     with atomic_path(target) as temporary:
-        text = html.page(f"{found[0].mission.name} under stress - colift", "\n".join(body))
+        text = html.page(f"{first.name} under stress - colift", "\n".join(body))
         temporary.write_text(text, encoding="utf-8", newline="\n")
     return target
 
 
 def _matrix(title: str, header: list[str], lines: list[list[str]]) -> str:
-    cells = [[f"<b>{escape(first)}</b>", *map(_marked, rest)] for first, *rest in lines]
-    return f"<h3>{escape(title)}</h3>" + html.table(header, cells)
+    marked = range(1, len(header)) if title == SHARES else (1,)
+    cells = [
+        [
+            f"<b>{escape(text)}</b>" if k == 0 else _marked(text) if k in marked else escape(text)
+            for k, text in enumerate(line)
+        ]
+        for line in lines
+    ]
+    return f"<h3>{escape(title)}</h3>" + html.table(header, cells, numbers=range(1, len(header)))
 
 
 def _marked(text: str) -> str:
-    passed, _, flown = text.partition(",")[0].partition("/")
+    passed, _, flown = text.partition(" ")[0].partition("/")
     level = "pass" if passed == flown else "fail" if passed == "0" else "warn"
     return f'<span class="{level}" style="color:var(--tone)">{escape(text)}</span>'
 
 
-def _failures(failing: Sequence[Verdict], folder: Path, replays: int) -> str:
+def _failures(
+    failing: Sequence[Row], missions: Mapping[str, Mapping[str, Any]], folder: Path, replays: int
+) -> str:
     if not failing:
         return '<p class="soft">None.</p>'
-    rows = []
-    for k, verdict in enumerate(failing):
-        name = f"failing/{k + 1:03d}"
+    lines = []
+    for k, row in enumerate(failing):
+        name, mission = f"failing/{k + 1:03d}", missions[row["key"]]
         with atomic_path(folder / f"{name}.toml") as temporary:
-            temporary.write_text(tomli_w.dumps(verdict.mission.resolved()), encoding="utf-8")
+            temporary.write_text(tomli_w.dumps(mission), encoding="utf-8")
         links = f'<a href="{name}.toml">mission</a>'
-        if k < replays and verdict.judged:
-            _write_replay(verdict, folder / f"{name}.html")
+        if k < replays and row["status"] == "flown":
+            _write_replay(mission, str(row["allocator"]), folder / f"{name}.html")
             links = f'<a href="{name}.html">replay</a>, {links}'
-        row = verdict.row
         where = f"{row['allocator']}, {row['plant']}, seed {row['seed']}"
-        rows.append((escape(str(row["condition"])), escape(where), escape(verdict.reason), links))
+        lines.append((escape(str(row["condition"])), escape(where), escape(reason(row)), links))
     note = (
         f"The first {replays} have a replay. " if len(failing) > replays else ""
     ) + "A mission file flies again with: colift run FILE"
-    return html.table(("Condition", "Flight", "Why", "See"), rows) + (
+    return html.table(("Condition", "Flight", "Why", "See"), lines) + (
         f'<p class="soft">{escape(note)}</p>'
     )
 
 
-def _write_replay(verdict: Verdict, path: Path) -> None:
+def _write_replay(mission: Mapping[str, Any], label: str, path: Path) -> None:
     from colift.runner import run
     from colift.viewer.data import payload
     from colift.viewer.page import write_page
 
-    flown = run(verdict.mission)
-    write_page(path, payload([flown.recording], [flown.metrics], [str(verdict.row["allocator"])]))
+    flown = run(mission)
+    write_page(path, payload([flown.recording], [flown.metrics], [label]))
