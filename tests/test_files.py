@@ -139,5 +139,5 @@ def test_render_without_its_extra(tmp_path: Path) -> None:
         [sys.executable, "-c", script, str(tmp_path), "render", str(kept), "--png", str(tmp_path / "x.png")],
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
-    assert "render" in one_line(done)
+    assert "need the package playwright" in one_line(done)
     assert not (tmp_path / "x.png").exists()
