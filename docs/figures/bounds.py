@@ -38,25 +38,28 @@ def fly():
     return found
 
 
-def main():
-    found = stored(__file__, fly)
-    for name, page in (("push", "theory/control.md"), ("turn", "world.md")):
-        changes = "".join(f" --set {key}={value:g}" for key, value in CASES[name][3].items())
-        rows = [
+def shown(name, flights):
+    changes = "".join(f" --set {key}={value:g}" for key, value in CASES[name][3].items())
+    rows = []
+    for k, each in enumerate(flights):
+        far = (each["median_m"], each["most_m"])
+        rows.append(
             [
                 f"`colift run {each['label']}{changes}`"
                 if k == 0
                 else f"the same, `{each['label']}`",
                 f"{each['held']} of {each['flights']}",
-                *(
-                    "-" if each[key] is None else f"{100.0 * each[key]:.1f} cm"
-                    for key in ("median_m", "most_m")
-                ),
+                *("-" if x is None else f"{100.0 * x:.1f} cm" for x in far),
             ]
-            for k, each in enumerate(found[name])
-        ]
-        header = [f"seeds {SEEDS[0]} to {SEEDS[-1]}", "held", "load off its path, median", "most"]
-        fill(page, name, table(header, rows))
+        )
+    header = [f"seeds {SEEDS[0]} to {SEEDS[-1]}", "held", "load off its path, median", "most"]
+    return table(header, rows)
+
+
+def main():
+    found = stored(__file__, fly)
+    fill("theory/control.md", "push", shown("push", found["push"]))
+    fill("world.md", "turn", shown("turn", found["turn"]))
 
 
 if __name__ == "__main__":
