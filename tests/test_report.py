@@ -14,8 +14,9 @@ import pytest
 import colift
 from colift import metrics
 from colift.mission import load_mission, mission_names
+from colift.moments import KINDS
 from colift.recording import Recording
-from colift.report import comparison, figures, html, panels, render, style
+from colift.report import comparison, figures, html, marks, panels, render, style
 
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:
@@ -155,8 +156,93 @@ def test_large_svg_is_shown_as_bitmap(spiral: Recording) -> None:
     entry = figures.FIGURES["tensions"]
     drawing = render.draw({"tensions": entry}, spiral)[0]
     huge = replace(drawing, svg=drawing.svg + " " * render.LARGEST_SVG)
-    assert drawing.inline().startswith("<svg")
+    assert drawing.inline().startswith('<ul class="legend">')
     assert huge.inline().startswith('<img src="data:image/png;base64,')
+
+
+@pytest.fixture(scope="module")
+def cut() -> Recording:
+    return fly("cut-in-flight")
+
+
+def test_moments_are_in_the_table_and_in_the_figures(cut: Recording) -> None:
+    drawings = render.draw({"tensions": figures.FIGURES["tensions"]}, cut)
+    page = html.report(cut, metrics.compute(cut), drawings)
+    section = page.split("<h2>Moments</h2>")[1].split("<h2>")[0]
+    assert section.index("Cable of drone 0 cut") < section.index("Drone 0 is judged lost")
+    assert section.count("<tr>") == 1 + len(cut.moments)
+    kinds = {moment.kind for moment in cut.moments}
+    assert {"fault", "departure"} <= kinds
+    for kind in ("fault", "departure"):
+        assert f">{KINDS[kind]}</text>" in drawings[0].svg
+        assert f"{marks.icon(kind)}{KINDS[kind]}</li>" in drawings[0].legend
+
+
+def test_a_line_stands_at_every_cause(cut: Recording) -> None:
+    axes = figures.FIGURES["tensions"].draw(cut).axes[0]
+    lines = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"]
+    causes = [m.time for m in cut.moments if m.kind in ("fault", "departure")]
+    assert len(causes) >= 2
+    assert sorted(lines) == pytest.approx(causes)
+
+
+def test_the_angle_that_the_mission_asks_for_is_drawn_and_no_other() -> None:
+    def limits(**settings: object) -> list[float]:
+        axes = figures.FIGURES["angles"].draw(fly(**settings)).axes[0]
+        red = [line for line in axes.lines if line.get_color() == style.LIMIT]
+        assert [line.get_label() for line in red] == [
+            f"{line.get_ydata()[0]:g}° limit" for line in red
+        ]
+        return [line.get_ydata()[0] for line in red]
+
+    safe = {"allocation.kind": "safe", "criteria": {}, "timing.duration": 0.1}
+    assert limits(**safe, **{"allocation.min_angle_deg": 22.0}) == [22.0]
+    assert limits(**{"criteria": {}, "timing.duration": 0.1}) == []
+
+
+def test_thrust_and_tilt_are_drawn_as_flown(spiral: Recording) -> None:
+    for name, values in (("thrust", spiral["applied_thrusts"]), ("tilt", metrics.tilts(spiral))):
+        axes = figures.FIGURES[name].draw(spiral).axes[0]
+        for drone in range(4):
+            drawn = axes.lines[drone].get_ydata()
+            assert drawn[0] == values[0, drone]
+            assert drawn.max() == values[:, drone].max()
+    assert metrics.tilts(spiral).max() == metrics.compute(spiral)["max_tilt_deg"]
+
+
+def test_figures_of_a_page_follow_its_theme_and_files_do_not(cut: Recording, written: Path) -> None:
+    for drawing in render.draw(figures.drawable(cut), cut):
+        assert "var(" not in drawing.svg
+        inline = drawing.inline()
+        bare = set(re.findall(r"(?<!,)#[0-9a-f]{6}\b(?=[\s;\"])", inline))
+        assert bare == set(), drawing.name
+        assert re.sub(r"var\(--f-\w{6},(#\w{6})\)", r"\1", inline).endswith(
+            drawing.svg[drawing.svg.index("<svg") :]
+        )
+    page = (written / "report.html").read_text()
+    for light, dark in style.DARK.items():
+        assert f"--f-{light[1:].lower()}:{dark.lower()};" in page
+
+
+def test_colours_of_a_dark_page_stand_out_from_it() -> None:
+    def luminance(colour: str) -> float:
+        parts = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+        linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722])
+
+    card = luminance("#1d2125")
+    lines = [*style.PALETTE, *style.SERIES, *style.COMPONENTS, style.INK, style.LIMIT]
+    for colour in lines:
+        contrast = (luminance(style.DARK[colour]) + 0.05) / (card + 0.05)
+        assert contrast >= 4.5, (colour, contrast)
+
+
+def test_the_verdict_is_a_banner_with_its_reasons(spiral: Recording) -> None:
+    missed = {**metrics.compute(spiral), "min_angle_deg": 12.0, "slack_time_s": 0.5}
+    page = html.report(spiral, missed, [])
+    banner = page.split('<div class="banner fail">')[1].split("</div>")[0]
+    assert banner.startswith("<p>Fail: min_angle_deg is 12, not &gt;= 30</p>")
+    assert banner.count("<li>") == 1  # slack
 
 
 def test_decimation_keeps_extremes_ends_and_gaps() -> None:

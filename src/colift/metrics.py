@@ -201,10 +201,15 @@ def min_cable_distance_m(r: Recording) -> float:
     "deg", "largest tilt of a drone that nothing has broken, its thrust axis from the vertical"
 )
 def max_tilt_deg(r: Recording) -> float:
-    q = r["attitudes"]
-    up = 1.0 - 2.0 * (q[..., 1] ** 2 + q[..., 2] ** 2)
     broken = (r["attached"] == 0.0) | (r["motor_health"] < 1.0).any(axis=2)
-    return _largest(np.degrees(np.arccos(np.clip(np.where(broken, np.nan, up), -1.0, 1.0))))
+    return _largest(np.where(broken, np.nan, tilts(r)))
+
+
+def tilts(recording: Recording) -> NDArray[np.float64]:
+    """Angle of each drone's thrust axis from the vertical (rows, n), degrees."""
+    q = recording["attitudes"]
+    up = 1.0 - 2.0 * (q[..., 1] ** 2 + q[..., 2] ** 2)
+    return np.asarray(np.degrees(np.arccos(np.clip(up, -1.0, 1.0))))
 
 
 @_metric("1", "largest thrust of a drone as a share of the most that it can give")
@@ -292,14 +297,12 @@ def saturated_time_s(r: Recording) -> float:
 
 @_metric("m", "least height of the load")
 def min_height_m(r: Recording) -> float:
-    return -_largest(-r["load"][:, 0, 2])
+    return float(r["load"][:, 0, 2].min())
 
 
 @_metric("1", "drones that left before the end")
 def lost_drones(r: Recording) -> float:
     flying = ~np.isnan(r["attached"])
-    if not flying.any():
-        return math.nan
     return float(np.count_nonzero(flying.any(axis=0) & ~flying[-1]))
 
 

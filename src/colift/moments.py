@@ -29,12 +29,15 @@ KINDS = {
     "departure": "drone leaves",
     "join": "drone joins",
     "descent": "descent",
-    "slack": "slack cable",
+    "slack": "slack",
     "angle": "angle below limit",
-    "fallback": "allocator fallback",
+    "fallback": "fallback",
     "outcome": "end",
 }
 """Every kind of moment, causes first, and what a legend calls it."""
+
+FOLLOWING = frozenset({"gap", "slack", "angle", "fallback"})
+"""Kinds that follow from others, and are many."""
 
 PAUSE = 0.25
 """Two stretches of the same closer than this are one, s."""
@@ -173,9 +176,13 @@ def _lasting(time: Array) -> Callable[[int, int], str]:
     def words(first: int, last: int) -> str:
         if last + 1 == len(time):
             return " to the end"
-        return f" for {time[last + 1] - time[first]:.3g} s"
+        return f" for {_seconds(time[last + 1] - time[first])}"
 
     return words
+
+
+def _seconds(duration: float) -> str:
+    return f"{duration:.3g} s" if duration >= 0.001 else "less than 1 ms"
 
 
 def _always(text: str) -> Callable[[int, int], str]:
@@ -241,7 +248,7 @@ def _slack(recording: Recording) -> Iterator[_Ongoing]:
     for i in np.flatnonzero((grown > 0.0).any(axis=0)).tolist():
 
         def more(first: int, last: int, gained: Array = grown[:, i]) -> str:
-            return f" for {np.nansum(gained[first : last + 1]):.3g} s"
+            return f" for {_seconds(np.nansum(gained[first : last + 1]))}"
 
         text = f"Cable {i} slack"
         yield _Ongoing("slack", "", i, recording.time, grown[:, i] > 0.0, _always(text), more)

@@ -25,7 +25,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,6 +40,7 @@ from colift.simulation.signals import CYCLE_SIGNALS, LEGEND, SIGNALS, Signal
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
     from colift.mission.schema import RealFlight
+    from colift.moments import Moment
 
 Array = NDArray[np.float64]
 FORMAT = "colift recording 1"
@@ -142,6 +143,13 @@ class Recording(Mapping[str, Array]):
     def source(self) -> str:
         """``"simulation"``, or ``"flight"`` for one that was flown in the real world."""
         return self.mission.source
+
+    @cached_property
+    def moments(self) -> list[Moment]:
+        """What is worth a mark, in order of time (:mod:`colift.moments`)."""
+        from colift.moments import find_moments
+
+        return find_moments(self)
 
     def measured(self, *names: str) -> bool:
         """Whether each of these signals is there and has any number in it."""

@@ -69,8 +69,8 @@ def open_url(browser: Any) -> Iterator[Open]:
 def open_replay(open_url: Open, tmp_path: Path) -> Open:
     """Write the page of some recordings and open it."""
 
-    def go(*recordings: Recording, **options: Any) -> Opened:
-        file = write_page(tmp_path / "replay.html", payload_of(*recordings))
+    def go(*recordings: Recording, data: Any = None, **options: Any) -> Opened:
+        file = write_page(tmp_path / "replay.html", data or payload_of(*recordings))
         return open_url(file.as_uri(), **options)
 
     return go

@@ -17,7 +17,7 @@ from fake_server import TOKEN, FakeServer
 
 STATE = {
     "type": "state", "paused": False, "speed": 1.0, "lag": 0.0, "values": {}, "viewers": 1,
-    "metrics": {}, "saved": None,
+    "metrics": {}, "level": "", "reasons": [], "saved": None,
 }  # fmt: skip
 
 

@@ -17,6 +17,8 @@ from colift.geometry import pairwise_angles
 from colift.mission.load import load_mission
 from colift.recording import Recording
 from colift.report import html
+from colift.verdict import judge
+from colift.viewer.data import payload
 from colift.viewer.page import write_page
 
 EVIL = "</script><img src=x onerror=\"document.title='owned'\"><b>bold</b>"
@@ -258,3 +260,36 @@ def test_a_report_shows_its_replay(open_url: Open, spiral: Recording, tmp_path: 
     frame.scroll_into_view_if_needed()
     frame.content_frame.locator(".stage canvas").wait_for()
     assert said == []
+
+
+def test_the_verdict_is_shown_with_every_reason(open_replay: Open, spiral: Recording) -> None:
+    numbers = metrics.compute(spiral) | {"min_angle_deg": 12.0, "slack_time_s": 0.5}
+    opened = open_replay(data=payload([spiral], [numbers], ["x"]))
+    banner = opened.page.locator("header .verdict")
+    assert banner.locator(".badge").inner_text() == "fail"
+    assert not banner.locator("ul").is_visible()
+    banner.locator("summary").click()
+    reasons = judge(spiral, numbers).reasons
+    assert len(reasons) == 2
+    assert banner.locator("li").all_inner_texts() == reasons
+
+
+def test_every_moment_is_in_the_list_and_every_cause_on_the_timeline(open_replay: Open) -> None:
+    broken = fly("cut-in-flight")
+    opened = open_replay(broken, size=(390, 844))
+    titles = [mark.get_attribute("title") for mark in opened.page.locator(".mark").all()]
+    causes = [m for m in broken.moments if m.kind in ("fault", "departure")]
+    assert len(causes) == 2
+    for moment in causes:
+        assert any(f": {moment.text}" in title for title in titles)
+    assert len(titles) < len(broken.moments)  # the others are counted
+    opened.click("Events")
+    assert opened.page.locator(".events li").count() == len(broken.moments)
+
+
+def test_without_a_limit_no_angle_is_low(open_replay: Open, spiral: Recording) -> None:
+    free = replace(spiral, mission=load_mission("paper-spiral", {"criteria": {}}))
+    opened = open_replay(free)
+    opened.seek(1.0)
+    assert opened.page.locator(".hud .low").count() == 0
+    assert opened.page.locator(".label.angle:visible").count() == 0

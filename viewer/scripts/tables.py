@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 
 from colift.allocation import Status
-from colift.moments import KINDS, MOST_PAIRED, status_word
+from colift.moments import FOLLOWING, KINDS, MOST_PAIRED, status_word
 from colift.report.marks import MARKS
+from colift.verdict import LEVELS
 
 TARGET = Path(__file__).parents[1] / "src" / "tables.ts"
 
@@ -25,6 +26,12 @@ export const STATUS = {json.dumps(statuses, indent=2)};
 /** Kinds of moments: a word, a shape in a box of 12 x 12, and the tone of its colour. */
 export const KINDS = {json.dumps(kinds, indent=2)};
 export type Kind = keyof typeof KINDS;
+
+/** Kinds that follow from others, and are many. */
+export const FOLLOWING: ReadonlySet<Kind> = new Set({json.dumps(sorted(FOLLOWING))} as const);
+
+/** How a flight went, from good to bad. */
+export type Level = {" | ".join(json.dumps(level) for level in LEVELS)};
 
 /** Above so many drones no pair of cables is looked at. */
 export const MOST_PAIRED = {MOST_PAIRED};

@@ -1,6 +1,6 @@
 // A flight as rows of numbers. Replay fills it at once, live appends to it; everything else only reads.
 
-import { MOST_PAIRED, type Kind } from "./tables";
+import { type Kind, type Level, MOST_PAIRED } from "./tables";
 
 /** A moment of a flight. */
 export interface Mark {
@@ -26,11 +26,14 @@ export interface FlightInfo {
   name: string;
   label: string;
   description: string;
-  level: string;
-  verdict: string;
+  /** The verdict; none before there is one. */
+  level: Level | "";
+  reasons: string[];
+  summary: string;
   n: number;
   cable_lengths: number[];
-  safe_angle_deg: number;
+  /** Least angle that was asked for, if any was. */
+  safe_angle_deg: number | null;
   /** Weight of the load and mean thrust of a drone, N: they set the length of arrows. */
   weight: number;
   thrust: number;

@@ -2,7 +2,7 @@
 
 import { VIEWS, type View } from "./camera";
 import { Clock } from "./clock";
-import type { Flight, Frame } from "./data";
+import type { Flight, FlightInfo, Frame } from "./data";
 import { button, el, format, icon, ICONS } from "./dom";
 import { about, eventList, numbers, panel } from "./panel";
 import { plots } from "./plots";
@@ -25,7 +25,7 @@ const HELP: [string, string][] = [
   ["\u2190 \u2192", "one row back or forward; with Shift a second"],
   ["Home End", "start, end"],
   ["[ ]", "slower, faster"],
-  [", .", "last event, next event"],
+  [", .", "last moment, next moment"],
   ["1 2 3 4", "orbit, follow, top, side"],
   ["f p a l w", "forces, paths, angles, labels, downwash"],
   ["t", "dark or light"],
@@ -44,6 +44,16 @@ export interface Options {
   keys?: Record<string, () => void>;
 }
 
+/** The level in a word and the first reason; all of them on demand. */
+function verdict({ level, reasons, summary }: FlightInfo): HTMLElement {
+  const badge = el("b", { class: "badge" }, level);
+  const [first, ...others] = reasons;
+  if (first === undefined) return el("p", {}, badge, el("span", {}, summary));
+  const more = others.length ? [el("small", {}, `+${others.length}`)] : [];
+  const items = [...reasons, ...(summary ? [summary] : [])].map((reason) => el("li", {}, reason));
+  return el("details", {}, el("summary", { title: "All reasons" }, badge, el("span", {}, first), ...more), el("ul", {}, ...items));
+}
+
 export class Cockpit {
   readonly clock = new Clock();
   readonly stages: Stage[];
@@ -54,6 +64,7 @@ export class Cockpit {
   private readonly hud: ((frame: Frame) => void)[] = [];
   private readonly chips = new Map<string, HTMLButtonElement>();
   private readonly help: HTMLDialogElement;
+  private readonly verdicts: HTMLElement[];
 
   constructor(
     root: HTMLElement,
@@ -63,6 +74,8 @@ export class Cockpit {
     const { clock } = this;
     this.stages = flights.map((flight) => new Stage(flight, this.shown));
     this.timeline = new Timeline(clock, flights);
+    this.verdicts = flights.map(() => el("div", { class: "verdict" }));
+    this.judge();
     this.help = this.makeHelp();
     const charts = plots(flights, clock, options.window);
     const list = eventList(flights, clock);
@@ -111,6 +124,18 @@ export class Cockpit {
     );
   }
 
+  /** Show the verdicts, where they have changed. */
+  judge(): void {
+    this.flights.forEach(({ info }, k) => {
+      const box = this.verdicts[k]!;
+      const said = [info.level, ...info.reasons, info.summary].join("\n");
+      if (box.dataset.said === said) return;
+      box.dataset.said = said;
+      box.className = `verdict ${info.level}`;
+      box.replaceChildren(...(info.level ? [verdict(info)] : []));
+    });
+  }
+
   look(view: View): void {
     this.view = view;
     for (const stage of this.stages) {
@@ -128,13 +153,12 @@ export class Cockpit {
 
   private header(extras: HTMLElement[]): HTMLElement {
     const names = [...new Set(this.flights.map((flight) => flight.info.name))].join(" | ");
-    const verdicts = this.flights.length === 1 ? [el("span", { class: `verdict ${this.flights[0]!.info.level}` }, this.flights[0]!.info.verdict)] : [];
     return el(
       "header",
       {},
       el("strong", { class: "brand" }, "colift"),
       el("h1", {}, names),
-      ...verdicts,
+      ...(this.flights.length === 1 ? [this.verdicts[0]!] : []),
       el("span", { class: "space" }),
       ...extras,
       button("Theme", "Dark or light (t)", () => theme.toggle(), icon(ICONS.sun)),
@@ -165,13 +189,13 @@ export class Cockpit {
     this.hud.push((frame) => {
       error!.textContent = `${format(100 * frame.error[0]!)} cm`;
       angle!.textContent = `${format(frame.angle[0]!, 1)}\u00b0`;
-      angle!.classList.toggle("low", frame.angle[0]! < flight.info.safe_angle_deg);
+      angle!.classList.toggle("low", frame.angle[0]! < (flight.info.safe_angle_deg ?? 0));
       const sum = frame.tensions.reduce((so, tension) => so + (Number.isFinite(tension) ? tension : 0), 0);
       total!.textContent = frame.tensions.some(Number.isFinite) ? `${sum.toFixed(2)} N` : "\u2013";
       status!.textContent = STATUS[frame.status[0]!] ?? "\u2013";
     });
     const several = this.flights.length > 1;
-    const title = several ? [el("div", { class: `title ${flight.info.level}` }, el("b", {}, flight.info.label), el("span", {}, flight.info.verdict))] : [];
+    const title = several ? [el("div", { class: "title" }, el("b", {}, flight.info.label), this.verdicts[this.flights.indexOf(flight)]!)] : [];
     const full = `${Number(flight.full.toPrecision(2))} N or more`;
     const scale = el("div", {}, el("dt", {}, "cables"), el("dd", { class: "tension-scale" }, "slack", el("i"), full));
     return el(

@@ -29,7 +29,7 @@ interface Plot {
   /** Vertical axis in powers of ten. */
   log?: boolean;
   /** A level not to fall below, drawn across. */
-  limit?: (flight: Flight) => number;
+  limit?: (flight: Flight) => number | undefined;
 }
 
 /** Above so many drones only a summary is drawn. */
@@ -112,7 +112,7 @@ export const PLOTS: Plot[] = [
     lines: (flight) => [single("smallest", (row) => flight.columns.angle.at(row)), ...pairs(flight)],
     summary: (flight) => (row) => flight.columns.angle.at(row),
     summaryTitle: "Smallest angle between cables",
-    limit: (flight) => flight.info.safe_angle_deg,
+    limit: (flight) => flight.info.safe_angle_deg ?? undefined,
   },
   {
     title: "Distance from reference",
@@ -232,7 +232,7 @@ class Chart {
         scales: { x: { time: false }, y: this.scale() },
         axes: [
           { stroke: palette.soft, grid, ticks, font: FONT, size: 22, gap: 4, values: (_chart, splits) => splits.map((t) => `${t}`) },
-          { stroke: palette.soft, grid, ticks, font: FONT, size: 42, gap: 6, space: 28, values: (_chart, splits) => splits.map(short) },
+          { stroke: palette.soft, grid, ticks, font: FONT, size: 42, gap: 6, space: 20, values: (_chart, splits) => splits.map(short) },
         ],
         series: [
           {},

@@ -52,7 +52,7 @@ export const KINDS = {
     "tone": "bad"
   },
   "slack": {
-    "word": "slack cable",
+    "word": "slack",
     "shape": "M1 4Q6 12 11 4",
     "tone": "warn"
   },
@@ -62,9 +62,9 @@ export const KINDS = {
     "tone": "warn"
   },
   "fallback": {
-    "word": "allocator fallback",
+    "word": "fallback",
     "shape": "M6 1L11 6L6 11L1 6Z",
-    "tone": "note"
+    "tone": "info"
   },
   "outcome": {
     "word": "end",
@@ -73,6 +73,12 @@ export const KINDS = {
   }
 };
 export type Kind = keyof typeof KINDS;
+
+/** Kinds that follow from others, and are many. */
+export const FOLLOWING: ReadonlySet<Kind> = new Set(["angle", "fallback", "gap", "slack"] as const);
+
+/** How a flight went, from good to bad. */
+export type Level = "pass" | "warn" | "fail" | "lost";
 
 /** Above so many drones no pair of cables is looked at. */
 export const MOST_PAIRED = 64;

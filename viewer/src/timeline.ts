@@ -3,7 +3,7 @@
 import { SPEEDS, type Clock } from "./clock";
 import type { Flight, Mark } from "./data";
 import { button, el, icon, ICONS } from "./dom";
-import { KINDS } from "./tables";
+import { FOLLOWING, KINDS } from "./tables";
 
 /** Width of a mark, and so the least distance of two, px. */
 const MARK = 18;
@@ -53,6 +53,7 @@ export class Timeline {
       if (this.track.hasPointerCapture(move.pointerId)) this.scrub(move);
     });
     clock.onChange(() => this.update());
+    new ResizeObserver(() => this.drawMarks()).observe(this.track);
   }
 
   /** Move by rows of the first flight. */
@@ -107,13 +108,24 @@ export class Timeline {
     if (state === this.drawn) return;
     this.drawn = state;
     this.marks.replaceChildren();
+    const apart = (100 * MARK) / width;
     this.flights.forEach((flight, lane) => {
+      // Causes of about the same time stand beside each other; what followed stands where there is room.
+      const placed: { place: number; made: HTMLElement; others: number }[] = [];
       let taken = -Infinity;
-      for (const mark of flight.events) {
-        // Marks of about the same time stand beside each other.
-        const place = Math.min(Math.max(this.part(mark.time), taken + (100 * MARK) / width), 100);
-        taken = place;
-        this.marks.append(this.mark(mark, flight, lane, place));
+      for (const mark of flight.events.filter(({ kind }) => !FOLLOWING.has(kind))) {
+        taken = Math.min(Math.max(this.part(mark.time), taken + apart), 100);
+        placed.push({ place: taken, made: this.mark(mark, flight, lane, taken), others: 0 });
+      }
+      for (const mark of flight.events.filter(({ kind }) => FOLLOWING.has(kind))) {
+        const place = this.part(mark.time);
+        const near = placed.find((other) => Math.abs(other.place - place) < apart);
+        if (near) near.others += 1;
+        else placed.push({ place, made: this.mark(mark, flight, lane, place), others: 0 });
+      }
+      for (const { made, others } of placed) {
+        if (others) made.title += ` (and ${others} more)`;
+        this.marks.append(made);
       }
     });
     this.marks.style.height = `${18 * this.flights.length}px`;

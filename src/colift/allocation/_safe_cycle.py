@@ -32,7 +32,8 @@ from colift.jit import inline
     MAX_RATE,
     SETTLING,
     TURNING,
-    PRICE,
+    BOUND_H,
+    BOUND_V,
     TOLERANCE,
     ITERATIONS,
     LIMITS,
@@ -41,7 +42,7 @@ from colift.jit import inline
     TILT,
     TOTAL,
     EQUAL,
-) = range(21)
+) = range(22)
 """Places in the parameter vector; HEAD of them, then PER_CABLE values for each cable."""
 HEAD = 24
 PER_CABLE = 5
@@ -64,20 +65,8 @@ KEEP = 0.05
 """Part of its margin that every limit keeps in one step."""
 Z_BAND = 10.0
 """Multipliers stay within this factor of kappa / g."""
-BALANCED = 1e-10
-"""Error of the force balance that counts as none, in shares of the load."""
-PATIENCE = 6
-"""Steps without the whole force, those at its price twice, after which nothing but force is asked for."""
-FORCE = 0.5
-"""Price of horizontal force then."""
-VERTICAL_FIRST = 20.0
-"""How much dearer vertical force is than horizontal force."""
-FIRM = 1e-3
-"""Barrier of every limit then."""
-RATE_FIRM = 0.5
-"""Barrier of the rate then, in the versine of the largest turn; no more than that of the others."""
-SLIGHT = 1e-3
-"""Largest part of the cost that is left then."""
+SHARPEN, SHARP = 0.1, 1e-3
+"""While force is given up the barrier of the rate falls by the factor, down to that part of kappa."""
 RETRIES = 8
 """Most step lengths tried in one iteration."""
 
@@ -312,15 +301,6 @@ def active_limits(n, limits, m, z):  # type: ignore[no-untyped-def]
 
 
 @inline
-def slight_cost(n, mu, rho, delta, data):  # type: ignore[no-untyped-def]
-    """Part of the cost at which no marginal cost of it, of any cable, comes near the price of force."""
-    worst = max(2.0 * n * mu, rho * delta)
-    for i in range(n):
-        worst = max(worst, data[newton.DATA * i + OMEGA] * data[newton.DATA * i + T_MAX])
-    return min(SLIGHT, 0.1 * FORCE / worst)
-
-
-@inline
 def iterate(  # type: ignore[no-untyped-def]
     n,
     limits,
@@ -332,10 +312,8 @@ def iterate(  # type: ignore[no-untyped-def]
     rho,
     kappa,
     kappa_rate,
-    spread,
-    price,
-    yielding,
-    slight,
+    bound_h,
+    bound_v,
     tolerance,
     max_iterations,
     pairs,
@@ -359,30 +337,21 @@ def iterate(  # type: ignore[no-untyped-def]
     M,
     info,
 ):
-    """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above.
-
-    Two phases. In the first the objective is the whole cost, and force may be missing at a price.
-    Where that does not balance the force soon, the second phase asks for the force only: the cost is
-    made ``slight``, and every barrier small against the price. As soon as the force is balanced the whole cost is
-    back, and no price is high enough to give force up again: each step keeps the balance.
-    ``yielding`` starts with the second phase.
-    """
+    """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above."""
     newton.margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g)
-    spread_now = spread
+    for i in range(n):
+        for k in range(limits):
+            weight = kappa_rate if k == newton.RATE else kappa
+            z[newton.LIMITS * i + k] = weight / g[newton.LIMITS * i + k]
+    for k in range(m):
+        z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
     iterations = 0
-    waited = 0
-    held = False
-    fresh = True
     bounded = False
     residual = math.inf
     balance = math.inf
-    missing = 0.0
     outcome = ITERATION_LIMIT
     shift = 0.0
     attempts = 0
-    cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
-    bound_h, bound_v = price, price * VERTICAL_FIRST
-    level = 1.0
     while True:
         rx, ry, rz = fx, fy, fz
         for i in range(n):
@@ -390,44 +359,15 @@ def iterate(  # type: ignore[no-untyped-def]
             ry += w[3 * i + 1]
             rz += w[3 * i + 2]
         balance = math.sqrt(rx * rx + ry * ry + rz * rz)
-        if balance <= BALANCED and not held:
-            held = True
-            bound_h = bound_v = math.inf
-            if yielding:
-                yielding = False
-                fresh = True
-        elif not held and not yielding and waited >= PATIENCE:
-            yielding = True
-            fresh = True
-        if fresh:
-            # A phase begins: its weights, and multipliers as if this were the middle of its path.
-            if yielding:
-                cost, mu_now, rho_now = slight, slight * mu, slight * rho
-                kappa_now, rate_now = FIRM, min(FIRM, RATE_FIRM * data[newton.VERS_RATE])
-                bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
-                spread_next = FIRM
-            else:
-                cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
-                spread_next = spread
-            ratio = spread_next / spread_now
-            spread_now = spread_next
-            for i in range(n):
-                for k in range(limits):
-                    weight = rate_now if k == newton.RATE else kappa_now
-                    z[newton.LIMITS * i + k] = weight / g[newton.LIMITS * i + k]
-            for k in range(m):
-                kappa_pair[k] *= ratio
-                z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
         newton.assemble(
             n,
             limits,
             m,
             pairs,
-            cost,
-            mu_now,
-            rho_now,
-            kappa_now,
-            rate_now,
+            mu,
+            rho,
+            kappa,
+            kappa_rate,
             kappa_pair,
             data,
             T,
@@ -441,20 +381,18 @@ def iterate(  # type: ignore[no-untyped-def]
         )
         if iterations > 0:
             residual = newton.stationarity(n, alpha, rows, lam)
-            if not fresh and yielding and residual <= tolerance * level:
-                missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
-                if missing > FIRM * (limits * n + m) or level >= 1e3:
-                    outcome = FORCE_REDUCED
-                    break
-                level *= 10.0
-                bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
-            if not fresh and not yielding and residual <= tolerance and held:
+            if residual <= tolerance and balance <= 1e-10:
                 outcome = CONVERGED
                 break
+            if bounded:
+                if residual <= tolerance and kappa_rate <= SHARP * kappa:
+                    outcome = FORCE_REDUCED
+                    break
+                # The turn is to be used to the full before force is given up.
+                kappa_rate = max(SHARPEN * kappa_rate, min(SHARP * kappa, kappa_rate))
             if iterations >= max_iterations:
                 break
-        fresh = False
-        if not newton.factor(n, shift, mu_now, T, alpha, rows, K, first, Y):
+        if not newton.factor(n, shift, mu, T, alpha, rows, K, first, Y):
             # Not convex here: build again, with a larger shift.
             shift = max(1e-2, 30.0 * shift)
             attempts += 1
@@ -474,12 +412,11 @@ def iterate(  # type: ignore[no-untyped-def]
             w[k] = w_new[k]
         for i in range(n):
             for k in range(limits):
-                weight = rate_now if k == newton.RATE else kappa_now
+                weight = kappa_rate if k == newton.RATE else kappa
                 c = newton.LIMITS * i + k
                 update_multiplier(c, weight, s, g, g_new, z)
         for k in range(m):
             update_multiplier(newton.LIMITS * n + k, kappa_pair[k], s, g, g_new, z)
-        waited += 2 if bounded else 1
         shift = 0.1 * shift if shift > 1e-2 else 0.0
         if s == 0.0:
             shift = max(1.0, 100.0 * shift)
@@ -519,13 +456,11 @@ def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, 
                 d = newton.DATA * i
                 if kind == newton.RATE or (kind == newton.CONE and data[d + COS_CONE] > 0.0):
                     ux, uy, uz, c = 0.0, 0.0, -1.0, data[d + COS_CONE]
-                    kept = KEEP * g[k]
                     if kind == newton.RATE:
-                        ux, uy, uz = data[d], data[d + 1], data[d + 2]
-                        c, kept = 1.0 - data[d + VERS_RATE] + kept, 0.0
+                        ux, uy, uz, c = data[d], data[d + 1], data[d + 2], 1.0 - data[d + VERS_RATE]
                     x, y, z = w[3 * i], w[3 * i + 1], w[3 * i + 2]
                     dx, dy, dz = dw[3 * i], dw[3 * i + 1], dw[3 * i + 2]
-                    step = 0.999 * cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz)
+                    step = 0.999 * cone_step(ux, uy, uz, c, x, y, z, dx, dy, dz, g[k])
                 ratio = min(ratio, step / s) if step < s else min(ratio, 0.5)
         if ratio == 1.0:
             for k in range(newton.LIMITS * n, newton.LIMITS * n + m):
@@ -538,15 +473,15 @@ def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, 
 
 
 @inline
-def cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Longest step that leaves ``u.w - c |w|`` no less than ``kept``, of which there is more now.
+def cone_step(ux, uy, uz, c, x, y, z, dx, dy, dz, margin):  # type: ignore[no-untyped-def]
+    """Longest step that leaves the limit ``g(w) = u.w - c |w|`` the part ``KEEP`` of its margin.
 
-    The smallest positive root of ``(u.(w + s dw) - kept)^2 = c^2 |w + s dw|^2``.
+    The smallest positive root of ``(u.(w + s dw) - KEEP g)^2 = c^2 |w + s dw|^2``.
     """
-    far = c * math.sqrt(x * x + y * y + z * z)
-    near = ux * x + uy * y + uz * z - kept
+    t = math.sqrt(x * x + y * y + z * z)
+    near = c * t + (1.0 - KEEP) * margin
     slope = ux * dx + uy * dy + uz * dz
-    constant = (near - far) * (near + far)
+    constant = (1.0 - KEEP) * margin * (near + c * t)
     linear = near * slope - c * c * (x * dx + y * dy + z * dz)
     square = slope * slope - c * c * (dx * dx + dy * dy + dz * dz)
     root = math.sqrt(max(linear * linear - square * constant, 0.0)) - linear

@@ -243,17 +243,14 @@ def judge(
 
     """
     name = recording.mission.name
-    known = np.isfinite(recording["directions"]).all(axis=(1, 2))
-    if not known.all() and (recording.source == "simulation" or not known.any()):
+    if np.isnan(recording["directions"]).any():
         raise ColiftError(f"{name}: needs the directions of all cables throughout the flight")
-    rows = np.isfinite(recording["force"]).all(axis=1) & known  # without the gaps of a log
+    rows = np.isfinite(recording["force"]).all(axis=1)
     time, force = recording.time[rows], recording["force"][rows]
     if len(time) < 2 or not force.any():
         raise ColiftError(f"{name}: holds no force commands to judge by")
     team, scale = twin(recording.mission.team, float(mean(np.linalg.norm(force, axis=1), time)))
-    whole = recording.complete()
-    names = ("desired_tensions", "desired_directions", "tensions", "directions")
-    arrays = {key: whole[key][rows] for key in names}
+    arrays = {key: recording[key][rows] for key in recording if not key.startswith("allocator_")}
     answers = [
         Answers(
             ON_BOARD, {}, time, force, arrays["desired_tensions"], arrays["desired_directions"]

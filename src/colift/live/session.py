@@ -32,6 +32,7 @@ from colift.recording import Recording
 from colift.reference.base import ReferencePart
 from colift.reference.guided import Guided, Triple
 from colift.simulation.flight import Flight
+from colift.verdict import Verdict, judge
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -96,7 +97,8 @@ class Session:
     allocators : list of str
         What can be chosen as allocator.
     state : dict
-        Of the last look: paused, speed reached, lag, values of knobs and choices, metrics, where it was saved.
+        Of the last look: paused, speed reached, lag, values of knobs and choices, metrics and verdict of the last
+        seconds, where it was saved.
 
     """
 
@@ -124,6 +126,7 @@ class Session:
         self._pace = (0.0, 0.0)  # clock and simulated time when the speed was last measured
         self._reached = 0.0
         self._numbers: dict[str, float] = {}
+        self._verdict: Verdict | None = None
         self.epoch = self.generation = 0
         self.allocators = knobs.allocators(mission.team)
         self.state: dict[str, Any] = {}
@@ -221,6 +224,7 @@ class Session:
         self._pending: tuple[str, float, str] | None = None
         self._steering, self._steering_ends = False, 0.0
         self._pace = (self._now, 0.0)
+        self._verdict = None
         with self._lock:
             self._rows.clear()
             self._marks.clear()
@@ -363,6 +367,7 @@ class Session:
             self._judged = now
             recent = self.flight.recording(since=self.flight.time - JUDGED)
             self._numbers = metrics.compute(recent)
+            self._verdict = judge(recent, self._numbers)
         self.state = {
             "paused": self._paused or self.flight.outcome != "completed",
             "speed": round(self._reached, 3),
@@ -372,6 +377,8 @@ class Session:
                 "allocation.kind": kind_of(self._allocator),
             },
             "metrics": self._numbers,
+            "level": self._verdict.level if self._verdict else "",
+            "reasons": self._verdict.reasons if self._verdict else [],
             "saved": self._saved,
         }
 

@@ -31,7 +31,7 @@ def tensions(recordings: Recordings) -> Figure:
 @register(
     COMPARISONS,
     "Angles between cables compared",
-    "Angle between every two cables, one panel per flight; 30 degrees dashed. Each line carries "
+    "Angle between every two cables, one panel per flight; the least angle that the mission asks for dashed. Each line carries "
     "the colours of its two drones.",
 )
 def angles(recordings: Recordings) -> Figure:
@@ -73,7 +73,7 @@ def _side_by_side(recordings: Recordings, draw: panels.Panel) -> Figure:
     values = []
     for panel, (label, recording) in zip(axes, recordings.items(), strict=True):
         values.append(draw(panel, recording))
-        panels.time_axis(panel, recording)
+        panels.time_axis(panel, recording, top=False)
         panel.set_title(label)
         if panel is not axes[0]:
             panel.set_ylabel("")

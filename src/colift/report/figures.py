@@ -65,9 +65,8 @@ FIGURES: dict[str, Entry[Recording]] = {}
 @register(
     FIGURES,
     "Path",
-    "Wide grey: where the load should go. Black: where it went; the squares are the load and the "
+    "Wide: where the load should go. Thin: where it went; the squares are the load and the "
     "dots the drones at the times given, with their cables. All axes have the same scale.",
-    needs=("load",),
 )
 def path(recording: Recording) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 4.8))
@@ -80,9 +79,9 @@ def path(recording: Recording) -> Figure:
 @register(
     FIGURES,
     "Position error",
-    "The load's position less its reference, by component. The grey band is plus and minus the "
+    "The load's position less its reference, by component. The pale band is plus and minus the "
     "distance between the two, so it touches whatever component carries the whole error.",
-    needs=("load", "reference"),
+    needs=("reference",),
 )
 def position_error(recording: Recording) -> Figure:
     return _over_time(recording, panels.position_error)
@@ -116,7 +115,7 @@ def wanted_tensions(recording: Recording) -> Figure:
     FIGURES,
     "Angles between cables",
     "Angle between every two actual cables; each line carries the colours of its two drones. "
-    "Drones come close where an angle falls below the dashed line at 30 degrees. More than ten "
+    "The dashed line is the least angle that the mission asks for, if it does. More than ten "
     "pairs are drawn as the range of all pairs, that of nearest neighbours, and the closest pair.",
     needs=("directions",),
 )
@@ -127,12 +126,32 @@ def angles(recording: Recording) -> Figure:
 @register(
     FIGURES,
     "Wanted and actual tension",
-    "Above: actual tensions, with those that the allocator wanted dashed in black. Below: actual "
+    "Above: actual tensions, with those that the allocator wanted thin and dashed. Below: actual "
     "less wanted tension, that is what the controllers did not follow.",
     needs=("tensions", "desired_tensions"),
 )
 def tension_tracking(recording: Recording) -> Figure:
     return _over_time(recording, panels.desired_tensions, panels.tension_error, height=1.75)
+
+
+@register(
+    FIGURES,
+    "Thrust",
+    "Thrust of each drone. A dashed line is the most that a drone can give, where that comes near.",
+    needs=("thrusts",),
+)
+def thrust(recording: Recording) -> Figure:
+    return _over_time(recording, panels.thrusts, height=1.75)
+
+
+@register(
+    FIGURES,
+    "Tilt",
+    "Angle of each drone's thrust from the vertical. A dashed line is the criterion, where that comes near.",
+    needs=("attitudes",),
+)
+def tilt(recording: Recording) -> Figure:
+    return _over_time(recording, panels.tilt, height=1.75)
 
 
 @register(
@@ -151,9 +170,10 @@ def allocator_time(recording: Recording) -> Figure:
 
 def _over_time(recording: Recording, *draw: panels.Panel, height: float = 2.3) -> Figure:
     """Panels over the same time axis, one above the other."""
-    figure, axes = style.grid(rows=len(draw), height=height)
+    kinds = len({moment.kind for moment in recording.moments})
+    figure, axes = style.grid(rows=len(draw), height=height, marks=-(-kinds // style.MARKS_A_LINE))
     for k, (panel, part) in enumerate(zip(axes, draw, strict=True)):
         panels.focus([panel], [part(panel, recording)])
-        panels.time_axis(panel, recording, label=k == len(draw) - 1)
+        panels.time_axis(panel, recording, label=k == len(draw) - 1, top=k == 0)
     style.legend(figure)
     return figure

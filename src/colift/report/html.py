@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING
 import tomli_w
 
 from colift.metrics import all_metrics
+from colift.moments import KINDS, Moment
 from colift.recording import Recording, atomic_path
+from colift.report.marks import icon
 from colift.verdict import Judgement, judge
 
 if TYPE_CHECKING:
@@ -23,9 +25,10 @@ if TYPE_CHECKING:
 
 STYLE = """
 :root{color-scheme:light dark;--ink:#1d2126;--soft:#5c6670;--back:#fbfbfa;--card:#fff;--rule:#e2e4e6;
---good:#1b7f4b;--warn:#a86400;--bad:#b3261e}
+--good:#1b7f4b;--warn:#a86400;--bad:#b3261e;--info:#0b62a8}
 @media (prefers-color-scheme:dark){:root{--ink:#e6e8ea;--soft:#9aa4ad;--back:#15181b;--card:#1d2125;
---rule:#33393f;--good:#5fcf95;--warn:#f0b34a;--bad:#ff8a80}}
+--rule:#33393f;--good:#5fcf95;--warn:#f0b34a;--bad:#ff8a80;--info:#7cc4ff;--f-ffffff:var(--card)}
+figure img{filter:invert(.88) hue-rotate(180deg)}}
 *{box-sizing:border-box}
 body{margin:0 auto;padding:2rem 1.25rem 4rem;max-width:52rem;background:var(--back);color:var(--ink);
 font:1rem/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;
@@ -40,7 +43,12 @@ font-size:.85rem}
 .facts li{border:1px solid var(--rule);border-radius:1rem;padding:.1rem .7rem}
 .banner{border-left:.35rem solid var(--tone);background:var(--card);padding:.7rem 1rem;
 border-radius:.25rem;margin:1.2rem 0;font-weight:600}
-.pass{--tone:var(--good)}.warn{--tone:var(--warn)}.fail,.lost{--tone:var(--bad)}
+.banner p{margin:0}.banner ul{margin:.3rem 0 0;padding-left:1.2rem;font-weight:400}
+.pass,.good{--tone:var(--good)}.warn{--tone:var(--warn)}.fail,.lost,.bad{--tone:var(--bad)}
+.info{--tone:var(--info)}
+.icon{width:.8em;height:.8em;fill:none;stroke:var(--tone);stroke-width:1.8;stroke-linecap:round;
+stroke-linejoin:round;margin-right:.45em;overflow:visible}
+.long{max-height:26rem;overflow-y:auto}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
 th{text-align:left;font-weight:600;font-size:.82rem}
@@ -53,17 +61,26 @@ th{vertical-align:bottom}
 code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,"DejaVu Sans Mono",monospace}
 td code{color:var(--soft)}
 figure{margin:0 0 2.2rem}
-figure .scroll{background:#fff;border:1px solid var(--rule);border-radius:.4rem;padding:.5rem}
+figure .scroll{background:var(--card);border:1px solid var(--rule);border-radius:.4rem;padding:.5rem}
 iframe{display:block;width:100%;aspect-ratio:16/10;min-height:30rem;border:1px solid var(--rule);
 border-radius:.4rem}
-figure svg,figure img{display:block;width:100%;height:auto;min-width:30rem}
+figure svg[role=img]:not(.icon),figure img{display:block;width:100%;height:auto;min-width:30rem}
+figure svg[role=img]:not(.icon){fill:var(--f-000000,#000)}
 figcaption{font-size:.9rem;margin-top:.5rem}
 figcaption b{color:var(--ink)}
 details{border:1px solid var(--rule);border-radius:.4rem;background:var(--card);padding:.6rem 1rem;
 margin:.6rem 0}
 summary{cursor:pointer;font-weight:600}
 pre{overflow-x:auto;margin:.7rem 0 .2rem}
-@media (max-width:40rem){body{padding:1.2rem .9rem 3rem}h1{font-size:1.4rem}
+.legend{display:none;flex-wrap:wrap;gap:.1rem .9rem;margin:0;padding:0 .2rem;list-style:none;
+font-size:.8rem}
+.legend svg:not(.icon){width:1.6rem;height:.7rem;margin-right:.35rem;fill:none;
+stroke-width:2.2}
+@media (max-width:40rem){figure svg[role=img]:not(.icon){min-width:0}figure .scroll{padding:.3rem}
+figure svg text{font-size:13px!important}figure svg[aria-label="Path"] text{font-size:11px!important}
+figure svg [id*="-ylabel_"]{transform:translateX(-9px)}figure svg [id*="-legend_"]{display:none}
+.legend{display:flex}
+body{padding:1.2rem .9rem 3rem}h1{font-size:1.4rem}
 .many thead{display:none}.many tr{display:grid;grid-template-columns:1fr 1fr;padding:.5rem 0;
 border-bottom:1px solid var(--rule)}.many td{border:0;padding:.1rem 0;text-align:left;min-width:0}
 .many td:first-child,.many td:last-child{grid-column:1/-1}.many td:first-child{font-weight:600}
@@ -74,10 +91,12 @@ border-bottom:1px solid var(--rule)}.many td{border:0;padding:.1rem 0;text-align
 
 def page(title: str, body: str) -> str:
     """A whole document in the common style; ``title`` is text, ``body`` is HTML."""
+    from colift.report.render import dark_colours
+
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
+        f"<title>{escape(title)}</title>\n<style>{STYLE}{dark_colours()}\n</style>\n</head>\n"
         f"<body>\n{body}\n</body>\n</html>\n"
     )
 
@@ -99,9 +118,14 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequenc
     return f'<div class="scroll">{text}</div>'.replace("<th >", "<th>").replace("<td >", "<td>")
 
 
-def banner(level: str, text: str) -> str:
-    """One sentence that stands out; ``level`` is one of :data:`colift.verdict.LEVELS`."""
-    return f'<p class="banner {level}">{escape(text)}</p>'
+def banner(level: str, said: Sequence[str]) -> str:
+    """What stands out: a level of :data:`colift.verdict.LEVELS` with what is said first, the rest as a list."""
+    first, *others = said or [""]
+    head = f"{level[:1].upper()}{level[1:]}{': ' * bool(first)}{escape(first)}"
+    listed = "".join(f"<li>{escape(each)}</li>" for each in others)
+    return (
+        f'<div class="banner {level}"><p>{head}</p>{f"<ul>{listed}</ul>" if listed else ""}</div>'
+    )
 
 
 def facts(values: Iterable[str]) -> str:
@@ -110,7 +134,7 @@ def facts(values: Iterable[str]) -> str:
 
 
 def figure(drawing: Drawing) -> str:
-    """A figure on a white card with its caption."""
+    """A figure on a card with its caption."""
     return (
         f'<figure>\n<div class="scroll">{drawing.inline()}</div>\n'
         f"<figcaption><b>{escape(drawing.title)}.</b> {escape(drawing.caption)}</figcaption>\n</figure>"
@@ -186,7 +210,7 @@ def report(
     parts = [
         f"<header><h1>{escape(mission.name)}</h1>",
         f'<p class="soft">{escape(mission.description)}</p></header>',
-        banner(verdict.level, verdict.sentence),
+        banner(verdict.level, verdict.said),
         facts(
             [
                 f"{recording.n} drone{'s' * (recording.n != 1)}",
@@ -197,6 +221,7 @@ def report(
             ]
         ),
         criteria_table(verdict.judged),
+        moments_table(recording.moments),
         "<h2>Numbers</h2>",
         metrics_table(metrics),
         frame(replay) if replay else "",
@@ -254,6 +279,18 @@ def criteria_table(judged: Sequence[Judgement]) -> str:
     return "<h2>Criteria</h2>" + table(
         ("Quantity", "Value", "Bound", "Verdict"), rows, numbers=(1,)
     )
+
+
+def moments_table(moments: Sequence[Moment]) -> str:
+    """When what happened, each with the mark that it has in the figures; nothing where nothing did."""
+    if not moments:
+        return ""
+    rows = [
+        (f"{m.time:.2f} s", f"{icon(m.kind)}{escape(KINDS[m.kind])}", escape(m.text))
+        for m in moments
+    ]
+    made = table(("Time", "Kind", "What"), rows, numbers=(0,))
+    return "<h2>Moments</h2>" + (made if len(rows) <= 12 else f'<div class="long">{made}</div>')
 
 
 def metrics_table(metrics: Mapping[str, float]) -> str:

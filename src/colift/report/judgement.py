@@ -74,8 +74,8 @@ def separation(judged: Sequence[Judged]) -> Figure:
 @register(
     SINGLE,
     "Smallest angle over time",
-    "Smallest angle between two cables that each allocator wanted; black what was wanted on board, grey "
-    "what the cables did; the paper's 30 degrees dashed.",
+    "Smallest angle between two cables that each allocator wanted; darkest what was wanted on board, "
+    "palest what the cables did; the paper's 30 degrees dashed.",
 )
 def smallest(judged: Judged) -> Figure:
     figure, (axes,) = style.grid(height=2.2, legend_rows=2)

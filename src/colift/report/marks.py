@@ -24,10 +24,14 @@ MARKS = {
     "descent": Mark("M6 1.5L6 10.5M2.5 7L6 10.5L9.5 7", "bad"),
     "slack": Mark("M1 4Q6 12 11 4", "warn"),
     "angle": Mark("M6 1.5L11 10.5L1 10.5Z", "warn"),
-    "fallback": Mark("M6 1L11 6L6 11L1 6Z", "note"),
+    "fallback": Mark("M6 1L11 6L6 11L1 6Z", "info"),
     "outcome": Mark("M2.5 2.5L9.5 2.5L9.5 9.5L2.5 9.5Z", "bad"),
 }  # fmt: skip
 """By kind of moment (:data:`colift.moments.KINDS`)."""
+
+
+TONES = {"good": "#1B7F4B", "warn": "#A86400", "bad": "#B3261E", "info": "#0B62A8"}
+"""Colours of the tones on white."""
 
 
 def icon(kind: str) -> str:

@@ -15,10 +15,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
-from colift.metrics import tracking_error
+from colift.metrics import thrust_limits, tilts, tracking_error
+from colift.moments import FOLLOWING, KINDS, Moment
 from colift.recording import Recording
 from colift.report import style
-from colift.verdict import limits
+from colift.verdict import criteria_of, limits
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,9 @@ FREE = np.empty(0)
 
 POINTS = 1200
 """Most points of a line."""
+
+NEXT = 0.013
+"""Least distance of two marks, as a share of the axis."""
 
 
 def decimate(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
@@ -110,7 +114,7 @@ def per_drone(axes: Axes, time: Array, values: Array) -> None:
         time,
         np.nanmin(values, axis=1),
         np.nanmax(values, axis=1),
-        color="#9DC3DE",
+        color=style.FILL,
         label=f"all {n} drones",
     )
     line(axes, time, np.nanmean(values, axis=1), color=style.PALETTE[0], label="mean")
@@ -140,19 +144,39 @@ def focus(panels: Sequence[Axes], values: Sequence[Array]) -> None:
             axes.text(0.985, 0.965, note, transform=axes.transAxes, ha="right", va="top", bbox=box)
 
 
-def time_axis(axes: Axes, recording: Recording, *, label: bool = True) -> None:
-    """Horizontal axis in seconds over the flight; events dotted, a diverged part shaded."""
+def time_axis(axes: Axes, recording: Recording, *, label: bool = True, top: bool = True) -> None:
+    """Horizontal axis in seconds over the flight with its moments; a diverged part shaded.
+
+    What causes something is a line across, what follows a mark at the top, where there is room.
+    """
     end = max(float(recording.time[-1]), 1e-3)
     axes.set_xlim(0.0, end)
     if label:
         axes.set_xlabel("time (s)")
-    for k, event in enumerate(recording.mission.events):
-        name = "event" if k == 0 else None
-        axes.axvline(event.at, color="#777777", linewidth=0.9, linestyle=":", label=name)
     last = float(intact(recording).time[-1])
     if last < end:
         axes.set_xlim(0.0, min(end, max(1.25 * last, 1e-3)))
-        axes.axvspan(last, end, color="#F3DCDC", zorder=0.5, linewidth=0.0, label="diverged")
+        axes.axvspan(last, end, color=style.SPOILT, zorder=0.5, linewidth=0.0, label="diverged")
+    begin, shown = axes.get_xlim()
+    taken: list[float] = []
+    for causing in (True, False):
+        for moment in recording.moments:
+            crowded = any(abs(moment.time - t) < NEXT * (shown - begin) for t in taken)
+            if (moment.kind not in FOLLOWING) is causing and (causing or not crowded):
+                taken.append(moment.time)
+                _mark(axes, moment, top=top)
+
+
+def _mark(axes: Axes, moment: Moment, *, top: bool) -> None:
+    look = style.mark(moment.kind)
+    if moment.kind not in FOLLOWING:
+        axes.axvline(moment.time, color=look["color"], linewidth=0.8, linestyle=":", zorder=1.5)
+    if top:
+        (drawn,) = axes.plot(
+            moment.time, 1.045, transform=axes.get_xaxis_transform(), clip_on=False, linestyle="",
+            markersize=7.0, markerfacecolor="none", label=KINDS[moment.kind], **look,
+        )  # fmt: skip
+        drawn.set_gid(style.MARKED)
 
 
 def position_error(axes: Axes, recording: Recording) -> Array:
@@ -160,7 +184,7 @@ def position_error(axes: Axes, recording: Recording) -> Array:
     flight = intact(recording)
     error = 100.0 * tracking_error(flight)
     distance = np.linalg.norm(error, axis=1)
-    band(axes, flight.time, -distance, distance, color="#EDEDED", label="± distance")
+    band(axes, flight.time, -distance, distance, color=style.PALE, label="± distance")
     for name, colour, values in zip("xyz", style.COMPONENTS, error.T, strict=True):
         line(axes, flight.time, values, color=colour, label=name)
     axes.set_ylabel("position error (cm)")
@@ -196,7 +220,7 @@ def desired_tensions(axes: Axes, recording: Recording) -> Array:
             axes,
             flight.time,
             values,
-            color="black",
+            color="#000000",
             linestyle=(0, (3, 3)),
             linewidth=0.8,
             label=name,
@@ -211,6 +235,37 @@ def tension_error(axes: Axes, recording: Recording) -> Array:
     per_drone(axes, flight.time, error)
     axes.set_ylabel("tension error (N)")
     return error
+
+
+def thrusts(axes: Axes, recording: Recording) -> Array:
+    """Thrust of each drone, N, with the most that it can give dashed where that comes near."""
+    flight = intact(recording)
+    values = flight["applied_thrusts" if flight.measured("applied_thrusts") else "thrusts"]
+    per_drone(axes, flight.time, values)
+    most = thrust_limits(recording)
+    if most is not None and np.nanmax(values) > 0.7 * most.min():
+        for k, limit in enumerate(np.unique(most)):
+            least_or_most(axes, limit, "most thrust" if k == 0 else None)
+    axes.set_ylabel("thrust (N)")
+    return values
+
+
+def tilt(axes: Axes, recording: Recording) -> Array:
+    """Tilt of each drone, degrees, with the mission's limit where that comes near."""
+    flight = intact(recording)
+    values = tilts(flight)
+    per_drone(axes, flight.time, values)
+    bound = criteria_of(recording.mission).get("max_tilt_deg")
+    if bound is not None and bound.max is not None and np.nanmax(values) > 0.7 * bound.max:
+        least_or_most(axes, bound.max, f"{bound.max:g}° limit")
+    axes.set_ylabel("tilt (deg)")
+    axes.set_ylim(0.0, max(axes.get_ylim()[1], 1.0))
+    return FREE
+
+
+def least_or_most(axes: Axes, value: float, label: str | None) -> None:
+    """A dashed line at a limit."""
+    axes.axhline(value, color=style.LIMIT, linestyle=(0, (5, 3)), linewidth=1.0, label=label)
 
 
 def nearest_angles(directions: Array) -> tuple[NDArray[np.intp], Array, Array]:
@@ -259,13 +314,13 @@ def angles(axes: Axes, recording: Recording) -> Array:
     else:
         rows, nearest, widest = nearest_angles(flight["directions"])
         near, wide, time = np.degrees(nearest), np.degrees(widest), time[rows]
-        band(axes, time, near.min(axis=1), wide, color="#EAEAEA", label="all pairs")
+        band(axes, time, near.min(axis=1), wide, color=style.PALE, label="all pairs")
         band(
             axes,
             time,
             near.min(axis=1),
             near.max(axis=1),
-            color="#9DC3DE",
+            color=style.FILL,
             label="nearest neighbours",
         )
         line(axes, time, near.min(axis=1), color=style.PALETTE[0], label="closest pair")
@@ -284,13 +339,7 @@ def least_angle(axes: Axes, degrees: float | None) -> None:
     """A dashed line at the angle that was asked for, if any was; the axis starts at zero."""
     top = axes.get_ylim()[1]
     if degrees is not None:
-        axes.axhline(
-            degrees,
-            color=style.LIMIT,
-            linestyle=(0, (5, 3)),
-            linewidth=1.0,
-            label=f"{degrees:g}° limit",
-        )
+        least_or_most(axes, degrees, f"{degrees:g}° limit")
         top = max(top, degrees * 1.2)
     axes.set_ylim(0.0, top)
 
@@ -306,7 +355,7 @@ def allocator_time(axes: Axes, recording: Recording) -> None:
         return
     low, high = durations.min() * 0.8, durations.max() * 1.25
     counts, edges = np.histogram(durations, np.geomspace(low, high, 61))
-    axes.stairs(counts, edges, fill=True, color="#9DC3DE", baseline=0.5)
+    axes.stairs(counts, edges, fill=True, color=style.FILL, baseline=0.5)
     marks = {
         "median": (np.median(durations), "-"),
         "99 %": (np.percentile(durations, 99), (0, (4, 2))),
@@ -354,8 +403,8 @@ def path(axes: Any, recording: Recording) -> None:
         axes.text(
             x, y, z, f"\u00a0\u00a0 {flight.time[row]:.3g} s", fontsize=8, color="#444444", va="top"
         )
-    points = np.concatenate([wanted, flown, drones.reshape(-1, 3)])
-    _equal_box(axes, points[np.isfinite(points).all(axis=1)])
+    places = drones.reshape(-1, 3)
+    _equal_box(axes, np.concatenate([wanted, flown, places[np.isfinite(places).all(axis=1)]]))
     for name in "xyz":
         getattr(axes, f"set_{name}label")(f"{name} (m)", labelpad=0.0)
         axes.tick_params(axis=name, pad=0.0)
@@ -367,10 +416,9 @@ def snapshots(flown: Array, apart: float, most: int = 4) -> list[int]:
     out = np.array([np.cos(azimuth), np.sin(azimuth)])
     right = [-out[1], out[0], 0.0]
     up = [*(-np.sin(elevation) * out), np.cos(elevation)]
-    known = np.flatnonzero(np.isfinite(flown).all(axis=1))
-    candidates = known[np.linspace(0, len(known) - 1, min(61, len(known))).astype(int)]
+    candidates = np.linspace(0, len(flown) - 1, min(61, len(flown))).astype(int)
     seen = flown @ np.array([right, up]).T
-    rows = [int(candidates[0])]
+    rows = [0]
     while len(rows) < most:
         gaps = np.linalg.norm(seen[candidates, None] - seen[rows], axis=2).min(axis=1)
         if gaps.max() < apart:

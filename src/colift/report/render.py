@@ -15,12 +15,17 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.path import Path as MarkerPath
 from PIL import Image
 
+from colift.moments import KINDS
 from colift.recording import atomic_path
 from colift.report import style
 from colift.report.figures import Entry, Source
+from colift.report.marks import icon
 
 LARGEST_SVG = 300_000
 """Above this many bytes a page shows the bitmap instead."""
@@ -35,6 +40,8 @@ class Drawing:
     caption: str
     svg: str
     png: bytes
+    legend: str = ""
+    """The legend as HTML, for screens on which that of the figure has no room."""
 
     def save(self, folder: Path) -> None:
         """Write ``<name>.svg`` and ``<name>.png``."""
@@ -45,9 +52,26 @@ class Drawing:
     def inline(self) -> str:
         """HTML element that shows the figure without any file."""
         if len(self.svg) <= LARGEST_SVG:
-            return self.svg[self.svg.index("<svg") :]
+            return themed(self.legend + self.svg[self.svg.index("<svg") :])
         data = base64.b64encode(self.png).decode()
         return f'<img src="data:image/png;base64,{data}" alt="{escape(self.title)}">'
+
+
+def themed(text: str) -> str:
+    """SVG whose colours a page may choose: each becomes a variable that stands for itself by default."""
+    known = {colour.lower() for colour in (*style.DARK, "#FFFFFF")}
+
+    def variable(match: re.Match[str]) -> str:
+        colour = match[0].lower()
+        return f"var(--f-{colour[1:]},{colour})" if colour in known else colour
+
+    return re.sub(r"#[0-9a-fA-F]{6}\b(?=[\s;\"])", variable, text)
+
+
+def dark_colours() -> str:
+    """A style rule that gives the colours of :func:`themed` figures those of a dark page."""
+    pairs = "".join(f"--f-{light[1:]}:{dark};" for light, dark in style.DARK.items()).lower()
+    return f"@media (prefers-color-scheme:dark){{:root{{{pairs}}}}}"
 
 
 def draw(table: Mapping[str, Entry[Source]], source: Source) -> list[Drawing]:
@@ -57,8 +81,37 @@ def draw(table: Mapping[str, Entry[Source]], source: Source) -> list[Drawing]:
         for name, entry in table.items():
             figure = entry.draw(source)
             text = svg(figure, name, entry.title)
-            drawings.append(Drawing(name, entry.title, entry.caption, text, png(figure)))
+            drawn = png(figure)
+            drawings.append(Drawing(name, entry.title, entry.caption, text, drawn, legend(figure)))
     return drawings
+
+
+def legend(figure: Figure) -> str:
+    """The entries of a figure's legends as an HTML list."""
+    entries = [
+        f"<li>{_swatch(handle, text.get_text())}{escape(text.get_text())}</li>"
+        for each in figure.legends
+        for handle, text in zip(each.legend_handles, each.get_texts(), strict=True)
+    ]
+    return f'<ul class="legend">{"".join(entries)}</ul>' if entries else ""
+
+
+def _swatch(handle: Any, word: str) -> str:
+    """What a legend shows beside a word: a line, a mark or a patch of colour."""
+    marks = {called: kind for kind, called in KINDS.items()}
+    if not isinstance(handle, Line2D):
+        shapes = f'<path fill="{to_hex(handle.get_facecolor())}" d="M1 1H21V9H1Z"/>'
+    elif isinstance(handle.get_marker(), MarkerPath):
+        return icon(marks[word])
+    else:
+        colour, gap = to_hex(handle.get_color()), handle.get_gapcolor()
+        shapes = "" if gap is None else f'<path stroke="{to_hex(gap)}" d="M1 5H21"/>'
+        if handle.get_linestyle() != "None":
+            dashes = ' stroke-dasharray="5 3"' if handle.is_dashed() else ""
+            shapes += f'<path stroke="{colour}"{dashes} d="M1 5H21"/>'
+        if handle.get_marker() != "None":
+            shapes += f'<circle fill="{colour}" cx="11" cy="5" r="3"/>'
+    return f'<svg viewBox="0 0 22 10" aria-hidden="true">{shapes}</svg>'
 
 
 @contextmanager

@@ -107,7 +107,7 @@ def write_stress(
         "</p></header>",
         html.banner(
             "lost" if lost else "fail" if failing else "pass",
-            f"{shares.text(len(rows) - len(failing), len(rows))} flights pass.",
+            [f"{shares.text(len(rows) - len(failing), len(rows))} flights pass."],
         ),
         html.facts([f"{len(tables[0][2])} conditions", f"{len(rows)} flights", *sorted(criteria)]),
         "<h2>Matrix</h2>",

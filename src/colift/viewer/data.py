@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from colift.geometry import pairwise_angles
 from colift.metrics import all_metrics, compute, tracking_error
-from colift.moments import angle_pairs, find_moments
+from colift.moments import angle_pairs
 from colift.recording import Recording
 from colift.verdict import judge, limits
 
@@ -73,7 +73,7 @@ def _flight(
     recording: Recording, metrics: Mapping[str, float], label: str, budget: float
 ) -> dict[str, Any]:
     mission = recording.mission
-    moments = find_moments(recording)
+    moments = recording.moments
     signals = _signals(recording)
     rows = _rows(recording, [moment.time for moment in moments], signals, budget)
     verdict = judge(recording, metrics)
@@ -82,8 +82,8 @@ def _flight(
         "label": label,
         "description": mission.description,
         "level": verdict.level,
-        "verdict": verdict.sentence,
         "reasons": verdict.reasons,
+        "summary": verdict.summary if verdict.ok else "",
         "n": recording.n,
         "cable_lengths": mission.team.cable_lengths.tolist(),
         "safe_angle_deg": limits(mission).angle_deg,

@@ -1,6 +1,7 @@
 // The line to the server: it says hello, comes back by itself when lost, and hands on what it hears.
 
 import type { Mark } from "../data";
+import type { Level } from "../tables";
 
 export interface Knob {
   name: string;
@@ -30,7 +31,7 @@ export interface Hello {
   name: string;
   n: number;
   cable_lengths: number[];
-  safe_angle_deg: number;
+  safe_angle_deg: number | null;
   knobs: Knob[];
   choices: Choice[];
 }
@@ -50,6 +51,9 @@ export interface State {
   values: Record<string, number | string | null>;
   viewers: number;
   metrics: Record<string, number | null>;
+  /** The verdict on the last seconds, once there is one. */
+  level: Level | "";
+  reasons: string[];
   saved: string | null;
 }
 

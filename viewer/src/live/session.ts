@@ -140,6 +140,8 @@ export class Session {
       unit: "",
       value,
     }));
+    Object.assign(this.flight.info, { level: state.level, reasons: state.reasons });
+    this.cockpit?.judge();
   }
 
   private show(line: Line): void {
@@ -160,8 +162,9 @@ function about(hello: Hello): FlightInfo {
     name: hello.name,
     label: hello.name,
     description: "",
-    level: "good",
-    verdict: "",
+    level: "",
+    reasons: [],
+    summary: "",
     n: hello.n,
     cable_lengths: hello.cable_lengths,
     safe_angle_deg: hello.safe_angle_deg,

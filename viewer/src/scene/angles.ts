@@ -29,12 +29,13 @@ export const angles: Maker = (flight) => {
       edges.material.color.set(palette.warn);
     },
     update(frame, shown, labels) {
+      const least = flight.info.safe_angle_deg ?? 0;
       const close: [number, number, number][] = [];
       if (shown.angles && frame.n <= MOST_PAIRED) {
         for (let i = 0; i < frame.n; i++) {
           for (let j = i + 1; j < frame.n; j++) {
             const angle = angleBetween(frame.directions, i, j);
-            if (angle < flight.info.safe_angle_deg) close.push([angle, i, j]);
+            if (angle < least) close.push([angle, i, j]);
           }
         }
         close.sort((one, other) => one[0] - other[0]).splice(MOST);
