@@ -138,7 +138,8 @@ def test_a_cut_that_nobody_is_told_of_and_the_departure_that_follows() -> None:
 )  # fmt: skip
 def test_every_fault_is_one_moment(fault: dict[str, Any], text: str) -> None:
     at = 1.001 if fault.get("duration") == 0.002 else 1.0  # falls between two rows
-    recording = fly(fault=[{"at": at, "drone": 1, **fault}])
+    world = {"fault": [{"at": at, "drone": 1, **fault}], "detection": {"kind": "none"}}
+    recording = fly("cut-in-flight", **world)
     assert told(recording, "fault") == [(at, text)]
 
 
