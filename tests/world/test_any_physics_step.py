@@ -42,11 +42,11 @@ def test_motors():
     part, histories = Motors(noise=0.05), []
     for dt in STEPS:
         memory, params = part.memory(Team.uniform(2)), part.params(Team.uniform(2))
-        rows, thrusts, torques = [], np.zeros(2), np.zeros((2, 3))
+        rows, thrusts, torques, saturated = [], np.zeros(2), np.zeros((2, 3)), np.zeros(2)
         for k in range(round(1.0 / dt) + 1):
             Motors.kernel(
                 k, 5, dt, np.full(2, 6.0), np.zeros((2, 3)), np.ones((2, 4)), params, memory,
-                thrusts, torques,
+                thrusts, torques, saturated,
             )  # fmt: skip
             rows.append([*thrusts, *torques.ravel()])
         histories.append(np.array(rows)[:: round(0.01 / dt)])
@@ -106,7 +106,7 @@ def mission(step, **changes):
             "rates_period": 0.002, "rates_delay": 0.002, "load_period": 0.01, "tracking_period": 0.01,
         },
         "link": {"kind": "radio", "jitter": 0.0, "delay": 0.004, "loss": 0.1},
-        "actuation": {"kind": "motors", "noise": 0.03},
+        "actuation": {"kind": "motors", "noise": 0.03}, "plant": {"kind": "rigid-cables"},
         "disturbance": [
             {"kind": "wind", "speed": 6.0, "ramp": 0.0}, {"kind": "dryden", "speed": 6.0},
             {"kind": "gust", "every": 0.4, "duration": 0.3, "at": 0.0}, {"kind": "drag"},
