@@ -1,13 +1,33 @@
-"""How many cables a least angle allows in a cone: ``python docs/figures/how_many.py``."""
+"""Write how many cables a least angle allows in a cone (docs/theory/safe.md): ``python docs/figures/how_many.py [--fly]``.
+
+From ``how_many.json`` beside this file; ``--fly`` searches anew.
+"""
 
 import math
+
+from pages import fill, stored, table
 
 from colift.allocation._feasibility import most_cables
 
 CONES = (45, 60, 75)
+ANGLES = (15, 20, 30, 40, 60)
 
-print("| least angle | " + " | ".join(f"cone {cone}°" for cone in CONES) + " |")
-print("|---|" + "---|" * len(CONES))
-for angle in (15, 20, 30, 40, 60):
-    row = (most_cables(math.radians(angle), math.radians(cone)) for cone in CONES)
-    print(f"| {angle}° | " + " | ".join(f"{found} ({bound})" for found, bound in row) + " |")
+
+def search():
+    return {
+        angle: [most_cables(math.radians(angle), math.radians(cone)) for cone in CONES]
+        for angle in ANGLES
+    }
+
+
+def main():
+    rows = [
+        [f"{angle}°", *(f"{found} ({bound})" for found, bound in counts)]
+        for angle, counts in stored(__file__, search).items()
+    ]
+    header = ["least angle", *(f"cone {cone}°" for cone in CONES)]
+    fill("theory/safe.md", "how-many", table(header, rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,7 +1,10 @@
 """What the scripts that write parts of the pages share."""
 
-from collections.abc import Iterable
+import json
+import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 DOCS = Path(__file__).parents[1]
 
@@ -23,3 +26,11 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     head = list(header)
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def stored(script: str, measure: Callable[[], Any]) -> Any:
+    """What is kept as JSON beside a script (its ``__file__``); with ``--fly`` it is measured first."""
+    path = Path(script).with_suffix(".json")
+    if "--fly" in sys.argv[1:]:
+        path.write_text(json.dumps(measure(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return json.loads(path.read_text(encoding="utf-8"))

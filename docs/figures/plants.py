@@ -1,53 +1,73 @@
-"""The same mission on every plant: ``python docs/figures/plants.py [MISSION [KEY=VALUE ...]]``.
+"""Write the tables of docs/theory/plant.md on the same mission on every plant: ``python docs/figures/plants.py [--fly]``.
 
-Flies the mission (paper-spiral) on each plant and prints two Markdown tables: what the flight's metrics say, and how far
-positions, directions and tensions are from those on rigid cables at the same times, at most and root mean square. Rows
-before 0.1 s, in which cables that stretch settle, count for the first only.
+From ``plants.json`` beside this file. With ``--fly`` the paper's spiral is flown first on each plant: what the flight's
+metrics say, and how far positions, directions and tensions are from those on rigid cables at the same times, at most
+and root mean square. Rows before 0.1 s, in which cables that stretch settle, count for positions and directions only.
 """
 
-import sys
-
 import numpy as np
+from pages import fill, stored, table
 
 import colift
-from colift.mission.load import parse_override
 from colift.part import find, names
 
 SETTLED = 0.1  # s
+METRICS = (
+    "tracking_rms_m", "tracking_max_m", "min_angle_deg", "mean_total_tension_N", "peak_tension_N",
+    "slack_time_s",
+)  # fmt: skip
 
-mission = sys.argv[1] if len(sys.argv) > 1 else "paper-spiral"
-overrides = dict(parse_override(text) for text in sys.argv[2:])
-kinds = sorted(names("plant"), key=lambda kind: kind != "rigid-cables")
-flown = {
-    kind: colift.run(mission, overrides={**overrides, "plant.kind": kind})
-    for kind in kinds
-    if not find("plant", kind).missing()
-}
 
-print(
-    "| plant | load off its path, rms / most (mm) | smallest angle (deg) | mean total tension (N) ",
-    end="",
-)
-print("| peak tension (N) | slack (s) |\n|---|---|---|---|---|---|")
-for kind, run in flown.items():
-    m = run.metrics
-    print(
-        f"| `{kind}` | {1e3 * m['tracking_rms_m']:.4f} / {1e3 * m['tracking_max_m']:.4f} "
-        f"| {m['min_angle_deg']:.3f} | {m['mean_total_tension_N']:.4f} | {m['peak_tension_N']:.4f} "
-        f"| {m['slack_time_s']:.3f} |"
-    )
+def fly():
+    kinds = sorted(names("plant"), key=lambda kind: kind != "rigid-cables")
+    rigid, found = None, {}
+    for kind in kinds:
+        if find("plant", kind).missing():
+            continue
+        flown = colift.run("paper-spiral", overrides={"plant.kind": kind})
+        r = flown.recording
+        found[kind] = {metric: flown.metrics[metric] for metric in METRICS}
+        if rigid is None:
+            rigid = r
+            continue
+        load = np.linalg.norm(r["load"][:, 0] - rigid["load"][:, 0], axis=1)
+        chord = np.linalg.norm(r["directions"] - rigid["directions"], axis=2) / 2.0
+        angle = 2.0 * np.degrees(np.arcsin(np.minimum(chord, 1.0)))
+        tension = np.abs(r["tensions"] - rigid["tensions"])[r.time >= SETTLED]
+        found[kind]["apart"] = [
+            [float(x.max()), float(np.sqrt(np.mean(x**2)))] for x in (load, angle, tension)
+        ]
+    return found
 
-print(
-    "\n| against `rigid-cables` | load (mm) | directions (deg) | tensions (mN) |\n|---|---|---|---|"
-)
-rigid = flown.pop("rigid-cables").recording
-for kind, run in flown.items():
-    r = run.recording
-    load = 1e3 * np.linalg.norm(r["load"][:, 0] - rigid["load"][:, 0], axis=1)
-    cosine = np.linalg.norm(r["directions"] - rigid["directions"], axis=2) / 2.0
-    angle = 2.0 * np.degrees(np.arcsin(np.minimum(cosine, 1.0)))
-    tension = 1e3 * np.abs(r["tensions"] - rigid["tensions"])[r.time >= SETTLED]
-    cells = (
-        f"{np.nanmax(x):.2g} / {np.sqrt(np.nanmean(x**2)):.2g}" for x in (load, angle, tension)
-    )
-    print(f"| `{kind}` | {' | '.join(cells)} |")
+
+def main():
+    found = stored(__file__, fly)
+    rows = [
+        [
+            f"`{kind}`",
+            f"{1e3 * m['tracking_rms_m']:.4f} / {1e3 * m['tracking_max_m']:.4f}",
+            f"{m['min_angle_deg']:.3f}", f"{m['mean_total_tension_N']:.4f}",
+            f"{m['peak_tension_N']:.4f}", f"{m['slack_time_s']:.3g}",
+        ]
+        for kind, m in found.items()
+    ]  # fmt: skip
+    header = ["plant", "load off its path, rms / most (mm)", "smallest angle (deg)"]
+    header += ["mean total tension (N)", "peak tension (N)", "slack (s)"]
+    fill("theory/plant.md", "same-mission", table(header, rows))
+    rows = [
+        [
+            f"`{kind}`",
+            *(
+                f"{scale * most:.2g} / {scale * rms:.2g}"
+                for scale, (most, rms) in zip((1e3, 1.0, 1e3), m["apart"], strict=True)
+            ),
+        ]
+        for kind, m in found.items()
+        if "apart" in m
+    ]
+    header = ["against `rigid-cables`", "load (mm)", "directions (deg)", "tensions (mN)"]
+    fill("theory/plant.md", "apart", table(header, rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -53,13 +53,25 @@ def kernel(signature: Any) -> Callable[[F], F]:
 
     def decorate(function: F) -> F:
         with _without_scipy(), _cache_for(function):
-            compiled: F = numba.njit(
-                signature, cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH
+            compiled: Any = numba.njit(
+                cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH
             )(function)
+            if JIT_ENABLED:
+                _compile(compiled, signature)
         made.append(name_of(function))
-        return compiled
+        return cast(F, compiled)
 
     return decorate
+
+
+def _compile(kernel: Any, signature: Any) -> None:
+    """For this signature only, from the cache or into it; without a cache where it cannot be written."""
+    try:
+        kernel.compile(signature)
+    except OSError:  # such as a full disk: Numba has compiled the kernel, but could not save it
+        if not kernel.signatures:
+            raise
+    kernel.disable_compile()
 
 
 made: list[str] = []

@@ -297,12 +297,14 @@ def saturated_time_s(r: Recording) -> float:
 
 @_metric("m", "least height of the load")
 def min_height_m(r: Recording) -> float:
-    return float(r["load"][:, 0, 2].min())
+    return -_largest(-r["load"][:, 0, 2])
 
 
 @_metric("1", "drones that left before the end")
 def lost_drones(r: Recording) -> float:
     flying = ~np.isnan(r["attached"])
+    if not flying.any():
+        return math.nan
     return float(np.count_nonzero(flying.any(axis=0) & ~flying[-1]))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -39,7 +39,7 @@ ACTUAL_MARGIN = 3.0
 """By how much actual angles may fall short of the limit in flight, degrees."""
 CONES = {2: 35.0, 3: 35.0, 4: 35.0, 6: 45.0, 8: 60.0, 12: 65.0, 16: 70.0, 64: 70.0}
 """Half-angle of the cone in which the attacks start, degrees."""
-LEAST_ANGLES = {12: 25.0, 16: 25.0, 64: 11.0}
+LEAST_ANGLES = {12: 25.0, 16: 25.0, 20: 22.0, 24: 20.0, 64: 11.0}
 """Least angle asked for where 30 degrees are too wide for the team, degrees."""
 
 
@@ -156,16 +156,58 @@ def problem(n: int) -> tuple[Team, Safe]:
     )
 
 
-def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0) -> Attack:
-    """Send one seeded family of forces through one allocator and judge every answer."""
+class Answers(NamedTuple):
+    """A slice of an attack: one row per cycle.
+
+    ``forces`` (k, 3), N; ``before`` (k, n, 3), directions before the cycle; ``tensions`` (k, n), N; ``directions``
+    (k, n, 3); ``status`` (k,); ``times`` (k,), us.
+    """
+
+    forces: Array
+    before: Array
+    tensions: Array
+    directions: Array
+    status: Array
+    times: Array
+
+    def missing(self) -> Array:
+        """Size (k,) of the part of each force that was not given, N."""
+        given = np.einsum("ki,kim->km", self.tensions, self.directions)
+        return np.asarray(np.linalg.norm(given + self.forces, axis=1))
+
+
+def answers(
+    n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0, period: float = PERIOD
+) -> Iterator[Answers]:
+    """Send one seeded family of forces through one allocator, called every ``period`` (s)."""
     team, limits = problem(n)
     rng = np.random.default_rng([seed, n, list(FAMILIES).index(family)])
     least = math.radians(limits.min_angle_deg + 1.0)
     cone = math.radians(CONES.get(n, 70.0))
     directions = np.ascontiguousarray(spread_formation(n, cone, least))
-    before = directions.copy()
     tensions, info = np.zeros(n), np.zeros(INFO_SIZE)
     params, memory = part.params(team), part.memory(team)
+    every = round(period / PERIOD)
+    for begin in range(0, cycles, SLICE):
+        k = np.arange(every * begin, every * min(begin + SLICE, cycles), dtype=np.float64)
+        accelerations = np.ascontiguousarray(FAMILIES[family](PERIOD * k, rng)[::every])
+        forces = np.ascontiguousarray(
+            team.load_mass * (accelerations + np.array([0.0, 0.0, GRAVITY]))
+        )
+        out = np.zeros((len(forces), 2 + 4 * n))
+        first = directions.copy()
+        _attack(
+            type(part).kernel, forces, accelerations, period, params, memory, tensions, directions,
+            info, out,
+        )  # fmt: skip
+        alpha = out[:, 2 + n :].reshape(-1, n, 3)
+        before = np.concatenate([first[None], alpha[:-1]])
+        yield Answers(forces, before, out[:, 2 : 2 + n], alpha, out[:, 0], out[:, 1] / 1e3)
+
+
+def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0) -> Attack:
+    """Send one seeded family of forces through one allocator and judge every answer."""
+    limits = problem(n)[1]
     smallest, broken, unflagged, yields, avoidable, bad = 180.0, 0.0, 0, 0, 0, 0
     times = []
     reach = (
@@ -175,22 +217,10 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
         math.radians(limits.max_cone_deg),
     )
     flagged = [int(s) for s in Status if not s.ok]
-    for begin in range(0, cycles, SLICE):
-        t = PERIOD * np.arange(begin, min(begin + SLICE, cycles), dtype=np.float64)
-        accelerations = np.ascontiguousarray(FAMILIES[family](t, rng))
-        forces = np.ascontiguousarray(
-            team.load_mass * (accelerations + np.array([0.0, 0.0, GRAVITY]))
-        )
-        out = np.zeros((len(t), 2 + 4 * n))
-        _attack(
-            type(part).kernel, forces, accelerations, PERIOD, params, memory, tensions, directions,
-            info, out,
-        )  # fmt: skip
-        T, alpha = out[:, 2 : 2 + n], out[:, 2 + n :].reshape(-1, n, 3)
-        bad += int(np.count_nonzero(~np.isfinite(out).all(axis=1)))
+    for found in answers(n, family, cycles, part, seed=seed):
+        T, alpha, previous = found.tensions, found.directions, found.before
+        bad += int(np.count_nonzero(~(np.isfinite(T).all(1) & np.isfinite(alpha).all((1, 2)))))
         smallest = min(smallest, float(np.degrees(pairwise_angles(alpha).min())))
-        previous = np.concatenate([before[None], alpha[:-1]])
-        before = alpha[-1].copy()
         chord = np.linalg.norm(alpha - previous, axis=2)
         turned = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
         over = (
@@ -200,13 +230,13 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
             np.max(turned) - limits.max_rate * PERIOD,
         )
         broken = max(broken, *(float(x) for x in over))
-        balance = np.linalg.norm(np.einsum("ki,kim->km", T, alpha) + forces, axis=1)
-        told = np.isin(out[:, 0], flagged)
-        short = balance > BALANCE_TOLERANCE
+        told = np.isin(found.status, flagged)
+        short = found.missing() > BALANCE_TOLERANCE
         unflagged += int(np.count_nonzero(short & ~told))
         yields += int(np.count_nonzero(short))
-        avoidable += int(np.count_nonzero(~out_of_reach(forces[short], previous[short], *reach)))
-        times.append(out[:, 1] / 1e3)
+        proved = out_of_reach(found.forces[short], previous[short], *reach)
+        avoidable += int(np.count_nonzero(~proved))
+        times.append(found.times)
     microseconds = np.concatenate(times)
     return Attack(
         n=n,

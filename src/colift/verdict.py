@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -129,7 +129,7 @@ def criteria_of(mission: AnyMission) -> dict[str, Bound]:
         "max_tilt_deg": Bound(max=UPRIGHT),
     }
     for metric, setting in _ASKED.items():
-        asked = _least_asked(mission.resolved(), setting)
+        asked = _least_asked(mission, setting)
         if asked:
             default[metric] = Bound(min=asked)
     return {**{name: bound for name, bound in default.items() if name not in own}, **own}
@@ -139,14 +139,14 @@ _ASKED = {"min_angle_deg": "min_angle_deg", "min_drone_distance_m": "min_distanc
 """Settings of an allocator that ask for separation, by the metric that shows it."""
 
 
-def _least_asked(mission: Mapping[str, Any], setting: str) -> float | None:
+def _least_asked(mission: AnyMission, setting: str) -> float | None:
     """Least value that the allocators of the flight are given for a setting; None if one has none."""
-    asked = [mission.get("allocation", {}).get(setting)]
-    for event in mission.get("events", []):
-        if event["field"] == f"allocation.{setting}":
-            asked.append(event["value"])
-        elif event["field"] in {"allocation", "allocation.kind"}:
-            table = event["value"] if isinstance(event["value"], dict) else {}
+    asked = [mission.resolved().get("allocation", {}).get(setting)]
+    for event in mission.events:
+        if event.field == f"allocation.{setting}":
+            asked.append(event.value)
+        elif event.field in {"allocation", "allocation.kind"}:
+            table = event.value if isinstance(event.value, dict) else {}
             asked.append(table.get(setting))
     return None if None in asked else min(map(float, asked))
 
@@ -211,9 +211,16 @@ DESCENDED = "descended"
 """How the outcome of a flight begins that brought its load down because its drones could not carry it on."""
 
 
+MOST_FINDINGS = 3
+"""So many things that are wrong with a real flight's log are told, the others counted."""
+
+
 def _seen(recording: Recording, values: Mapping[str, float]) -> list[str]:
     """What misses no criterion but is worth a look."""
-    found = []
+    wrong = [str(each.get("text")) for each in recording.provenance.get("findings", [])]
+    found = [f"log: {text}" for text in wrong[:MOST_FINDINGS]]
+    if len(wrong) > MOST_FINDINGS:
+        found.append(f"log: {len(wrong) - MOST_FINDINGS} more findings")
     slack = values.get("slack_time_s", math.nan)
     if slack > 0.0:
         rods = recording.mission.kinds.get("plant") == "rigid-cables"

@@ -35,7 +35,7 @@ def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
         part.max_thrust / sigma - size,
         thrust[:, 2] - math.cos(math.radians(part.max_tilt_deg)) * size,
     ]
-    rate = np.sum(before * w, axis=1) - math.cos(delta) * T
+    rate = np.sum(before * alpha, axis=1) - math.cos(delta)
     value = 0.5 * T @ T + part.mu / sigma**2 * np.sum(gram[i, j] ** 2)
     value += rho * np.sum(1.0 - np.sum(alpha * home, axis=1))
     value -= part.barrier * sum(np.sum(np.log(g)) for g in limits)

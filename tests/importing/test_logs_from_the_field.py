@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import random
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,7 +20,11 @@ from made_up_flights import LENGTH, flight_columns, usd_bytes, usd_log, write_cs
 from colift import metrics
 from colift.errors import FlightDataError
 from colift.importing import Reading, import_flight
+from colift.judgement import judge
 from colift.recording import Recording
+from colift.report.html import write_report
+from colift.verdict import judge as verdict_of
+from colift.viewer.data import payload
 
 TIME = np.arange(400) * 0.01
 Columns = dict[str, np.ndarray]
@@ -242,6 +247,27 @@ def test_a_gap_is_left_out_and_counted(
     for name in ("tracking_max_m", "min_angle_deg"):
         assert numbers[name] == pytest.approx(clean[name], rel=1e-6), name
     assert found.mission.team.cable_lengths == pytest.approx(LENGTH)
+
+
+def test_a_flight_with_gaps_is_reported_replayed_and_judged(tmp_path: Path) -> None:
+    columns = flight_columns(3, TIME)
+    for body, rows in (("load", slice(50, 60)), ("uav1", slice(100, 112)), ("uav2", slice(0, 3))):
+        for axis in "xyz":
+            columns[f"{body}_{axis}"][rows] = np.nan
+    flight = import_flight([write_csv(tmp_path / "gap.csv", columns)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        numbers = metrics.compute(flight)
+        page = write_report(flight, tmp_path, metrics=numbers).read_text()
+        json.dumps(payload([flight], [numbers], ["x"]), allow_nan=False)
+    assert "12 rows left out" in page
+    verdict = verdict_of(flight, numbers)
+    assert verdict.level == "warn"
+    assert len(verdict.reasons) == 3
+    assert any("drone 1: 12 rows left out (1.00 to 1.11 s)" in reason for reason in verdict.reasons)
+    judged = judge(flight, ["ring"])
+    assert len(judged.answers[0].time) == 400 - 10 - 12 - 3
+    assert math.isnan(numbers["lost_drones"])
 
 
 def test_a_start_at_the_origin_is_no_gap(tmp_path: Path) -> None:

@@ -32,8 +32,7 @@ from colift.jit import inline
     MAX_RATE,
     SETTLING,
     TURNING,
-    BOUND_H,
-    BOUND_V,
+    PRICE,
     TOLERANCE,
     ITERATIONS,
     LIMITS,
@@ -42,7 +41,7 @@ from colift.jit import inline
     TILT,
     TOTAL,
     EQUAL,
-) = range(22)
+) = range(21)
 """Places in the parameter vector; HEAD of them, then PER_CABLE values for each cable."""
 HEAD = 24
 PER_CABLE = 5
@@ -65,8 +64,20 @@ KEEP = 0.05
 """Part of its margin that every limit keeps in one step."""
 Z_BAND = 10.0
 """Multipliers stay within this factor of kappa / g."""
-SHARPEN, SHARP = 0.1, 1e-3
-"""While force is given up the barrier of the rate falls by the factor, down to that part of kappa."""
+BALANCED = 1e-10
+"""Error of the force balance that counts as none, in shares of the load."""
+PATIENCE = 6
+"""Steps without the whole force, those at its price twice, after which nothing but force is asked for."""
+FORCE = 0.5
+"""Price of horizontal force then."""
+VERTICAL_FIRST = 20.0
+"""How much dearer vertical force is than horizontal force."""
+FIRM = 1e-3
+"""Barrier of every limit then."""
+RATE_FIRM = 0.5
+"""Barrier of the rate then, in the versine of the largest turn; no more than that of the others."""
+SLIGHT = 1e-3
+"""Largest part of the cost that is left then."""
 RETRIES = 8
 """Most step lengths tried in one iteration."""
 
@@ -301,6 +312,15 @@ def active_limits(n, limits, m, z):  # type: ignore[no-untyped-def]
 
 
 @inline
+def slight_cost(n, mu, rho, delta, data):  # type: ignore[no-untyped-def]
+    """Part of the cost at which no marginal cost of it, of any cable, comes near the price of force."""
+    worst = max(2.0 * n * mu, rho * delta)
+    for i in range(n):
+        worst = max(worst, data[newton.DATA * i + OMEGA] * data[newton.DATA * i + T_MAX])
+    return min(SLIGHT, 0.1 * FORCE / worst)
+
+
+@inline
 def iterate(  # type: ignore[no-untyped-def]
     n,
     limits,
@@ -312,8 +332,10 @@ def iterate(  # type: ignore[no-untyped-def]
     rho,
     kappa,
     kappa_rate,
-    bound_h,
-    bound_v,
+    spread,
+    price,
+    yielding,
+    slight,
     tolerance,
     max_iterations,
     pairs,
@@ -337,21 +359,30 @@ def iterate(  # type: ignore[no-untyped-def]
     M,
     info,
 ):
-    """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above."""
+    """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above.
+
+    Two phases. In the first the objective is the whole cost, and force may be missing at a price.
+    Where that does not balance the force soon, the second phase asks for the force only: the cost is
+    made ``slight``, and every barrier small against the price. As soon as the force is balanced the whole cost is
+    back, and no price is high enough to give force up again: each step keeps the balance.
+    ``yielding`` starts with the second phase.
+    """
     newton.margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g)
-    for i in range(n):
-        for k in range(limits):
-            weight = kappa_rate if k == newton.RATE else kappa
-            z[newton.LIMITS * i + k] = weight / g[newton.LIMITS * i + k]
-    for k in range(m):
-        z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
+    spread_now = spread
     iterations = 0
+    waited = 0
+    held = False
+    fresh = True
     bounded = False
     residual = math.inf
     balance = math.inf
+    missing = 0.0
     outcome = ITERATION_LIMIT
     shift = 0.0
     attempts = 0
+    cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
+    bound_h, bound_v = price, price * VERTICAL_FIRST
+    level = 1.0
     while True:
         rx, ry, rz = fx, fy, fz
         for i in range(n):
@@ -359,15 +390,44 @@ def iterate(  # type: ignore[no-untyped-def]
             ry += w[3 * i + 1]
             rz += w[3 * i + 2]
         balance = math.sqrt(rx * rx + ry * ry + rz * rz)
+        if balance <= BALANCED and not held:
+            held = True
+            bound_h = bound_v = math.inf
+            if yielding:
+                yielding = False
+                fresh = True
+        elif not held and not yielding and waited >= PATIENCE:
+            yielding = True
+            fresh = True
+        if fresh:
+            # A phase begins: its weights, and multipliers as if this were the middle of its path.
+            if yielding:
+                cost, mu_now, rho_now = slight, slight * mu, slight * rho
+                kappa_now, rate_now = FIRM, min(FIRM, RATE_FIRM * data[newton.VERS_RATE])
+                bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
+                spread_next = FIRM
+            else:
+                cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
+                spread_next = spread
+            ratio = spread_next / spread_now
+            spread_now = spread_next
+            for i in range(n):
+                for k in range(limits):
+                    weight = rate_now if k == newton.RATE else kappa_now
+                    z[newton.LIMITS * i + k] = weight / g[newton.LIMITS * i + k]
+            for k in range(m):
+                kappa_pair[k] *= ratio
+                z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
         newton.assemble(
             n,
             limits,
             m,
             pairs,
-            mu,
-            rho,
-            kappa,
-            kappa_rate,
+            cost,
+            mu_now,
+            rho_now,
+            kappa_now,
+            rate_now,
             kappa_pair,
             data,
             T,
@@ -381,18 +441,20 @@ def iterate(  # type: ignore[no-untyped-def]
         )
         if iterations > 0:
             residual = newton.stationarity(n, alpha, rows, lam)
-            if residual <= tolerance and balance <= 1e-10:
-                outcome = CONVERGED
-                break
-            if bounded:
-                if residual <= tolerance and kappa_rate <= SHARP * kappa:
+            if not fresh and yielding and residual <= tolerance * level:
+                missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
+                if missing > FIRM * (limits * n + m) or level >= 1e3:
                     outcome = FORCE_REDUCED
                     break
-                # The turn is to be used to the full before force is given up.
-                kappa_rate = max(SHARPEN * kappa_rate, min(SHARP * kappa, kappa_rate))
+                level *= 10.0
+                bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
+            if not fresh and not yielding and residual <= tolerance and held:
+                outcome = CONVERGED
+                break
             if iterations >= max_iterations:
                 break
-        if not newton.factor(n, shift, mu, T, alpha, rows, K, first, Y):
+        fresh = False
+        if not newton.factor(n, shift, mu_now, T, alpha, rows, K, first, Y):
             # Not convex here: build again, with a larger shift.
             shift = max(1e-2, 30.0 * shift)
             attempts += 1
@@ -412,11 +474,12 @@ def iterate(  # type: ignore[no-untyped-def]
             w[k] = w_new[k]
         for i in range(n):
             for k in range(limits):
-                weight = kappa_rate if k == newton.RATE else kappa
+                weight = rate_now if k == newton.RATE else kappa_now
                 c = newton.LIMITS * i + k
                 update_multiplier(c, weight, s, g, g_new, z)
         for k in range(m):
             update_multiplier(newton.LIMITS * n + k, kappa_pair[k], s, g, g_new, z)
+        waited += 2 if bounded else 1
         shift = 0.1 * shift if shift > 1e-2 else 0.0
         if s == 0.0:
             shift = max(1.0, 100.0 * shift)
@@ -456,11 +519,13 @@ def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, 
                 d = newton.DATA * i
                 if kind == newton.RATE or (kind == newton.CONE and data[d + COS_CONE] > 0.0):
                     ux, uy, uz, c = 0.0, 0.0, -1.0, data[d + COS_CONE]
+                    kept = KEEP * g[k]
                     if kind == newton.RATE:
-                        ux, uy, uz, c = data[d], data[d + 1], data[d + 2], 1.0 - data[d + VERS_RATE]
+                        ux, uy, uz = data[d], data[d + 1], data[d + 2]
+                        c, kept = 1.0 - data[d + VERS_RATE] + kept, 0.0
                     x, y, z = w[3 * i], w[3 * i + 1], w[3 * i + 2]
                     dx, dy, dz = dw[3 * i], dw[3 * i + 1], dw[3 * i + 2]
-                    step = 0.999 * cone_step(ux, uy, uz, c, x, y, z, dx, dy, dz, g[k])
+                    step = 0.999 * cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz)
                 ratio = min(ratio, step / s) if step < s else min(ratio, 0.5)
         if ratio == 1.0:
             for k in range(newton.LIMITS * n, newton.LIMITS * n + m):
@@ -473,15 +538,15 @@ def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, 
 
 
 @inline
-def cone_step(ux, uy, uz, c, x, y, z, dx, dy, dz, margin):  # type: ignore[no-untyped-def]
-    """Longest step that leaves the limit ``g(w) = u.w - c |w|`` the part ``KEEP`` of its margin.
+def cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Longest step that leaves ``u.w - c |w|`` no less than ``kept``, of which there is more now.
 
-    The smallest positive root of ``(u.(w + s dw) - KEEP g)^2 = c^2 |w + s dw|^2``.
+    The smallest positive root of ``(u.(w + s dw) - kept)^2 = c^2 |w + s dw|^2``.
     """
-    t = math.sqrt(x * x + y * y + z * z)
-    near = c * t + (1.0 - KEEP) * margin
+    far = c * math.sqrt(x * x + y * y + z * z)
+    near = ux * x + uy * y + uz * z - kept
     slope = ux * dx + uy * dy + uz * dz
-    constant = (1.0 - KEEP) * margin * (near + c * t)
+    constant = (near - far) * (near + far)
     linear = near * slope - c * c * (x * dx + y * dy + z * dz)
     square = slope * slope - c * c * (dx * dx + dy * dy + dz * dz)
     root = math.sqrt(max(linear * linear - square * constant, 0.0)) - linear

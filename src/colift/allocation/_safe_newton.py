@@ -11,7 +11,7 @@ with the force, or after recovery has moved those outside a limit) and the thrus
          TENSION_MAX   T_max - |w|                     >= 0     concave
          TENSION_MIN   a.w - T_min                     >= 0     linear, inside of |w| >= T_min
          CONE          d.w - cos(cone) |w|             >= 0     concave, d = -e3
-         RATE          a.w - cos(delta) |w|            >= 0     concave, delta = max_rate dt
+         RATE          a.alpha - cos(delta)            >= 0     delta = max_rate dt
          THRUST        f_max - |p - w|                 >= 0     concave
          TILT          e3.(p - w) - cos(tilt) |p - w|  >= 0     concave
          PAIR          cos(min_angle) - alpha_i.alpha_j >= 0    not concave
@@ -38,7 +38,7 @@ along one horizontal axis. If it is not positive definite, ``K + shift I`` is.
 
 Elastic force. ``s`` costs ``E_h |s_h| + E_v |s_v|``; the dual of that is the bound ``|lam_h| <= E_h``, ``|lam_v| <= E_v``
 on the multiplier, a problem in three unknowns after the elimination. Inside the bound ``s = 0`` exactly. Since
-``E_v >> E_h``, the horizontal part gives way first.
+``E_v >> E_h``, the horizontal part gives way first. When the bounds rise and fall: :func:`colift.allocation._safe_cycle.iterate`.
 
 Source: own derivation; interior point as in Nocedal and Wright, Numerical Optimization, ch. 19.
 This file imports only the compiler front end.
@@ -96,7 +96,7 @@ def margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g):  # type: ignore
         g[o] = data[d + T_MAX] - t
         g[o + 1] = t * (1.0 - versine) - data[d + T_MIN]
         g[o + 2] = -z - data[d + COS_CONE] * t
-        g[o + 3] = t * (data[d + VERS_RATE] - versine)
+        g[o + 3] = data[d + VERS_RATE] - versine
         if limits > 4:
             fx = data[d + P] - x
             fy = data[d + P + 1] - y
@@ -119,6 +119,7 @@ def assemble(  # type: ignore[no-untyped-def]
     limits,
     m,
     pairs,
+    cost,
     mu,
     rho,
     kappa,
@@ -234,50 +235,47 @@ def assemble(  # type: ignore[no-untyped-def]
         near = ax * x + ay * y + az * zc
         e1 = ax * b0 + ay * b1 + az * b2
         e2 = ax * d0 + ay * d1 + az * d2
-        # Functions of the direction: penalty, proximal term, pairs.
+        # Functions of the direction: penalty, proximal term, rate, pairs.
         hx, hy, hz = rho * data[d + HOME], rho * data[d + HOME + 1], rho * data[d + HOME + 2]
         s1 = 2.0 * mu * (b0 * px + b1 * py + b2 * pz) - (hx * b0 + hy * b1 + hz * b2)
         s2 = 2.0 * mu * (d0 * px + d1 * py + d2 * pz) - (hx * d0 + hy * d1 + hz * d2)
-        gamma1 = rows[o + 6] + s1
-        gamma2 = rows[o + 7] + s2
-        base = hx * x + hy * y + hz * zc - 2.0 * mu * (px * x + py * y + pz * zc)
-        c11 = rows[o + 10] + 2.0 * mu * (b0 * mb0 + b1 * mb1 + b2 * mb2) + base
-        c12 = rows[o + 11] + 2.0 * mu * (b0 * md0 + b1 * md1 + b2 * md2)
-        c22 = rows[o + 12] + 2.0 * mu * (d0 * md0 + d1 * md1 + d2 * md2) + base
+        z3, g3 = z[at + 3], 1.0 / g[at + 3]
+        f3 = z3 * g3
+        k3 = kappa_rate * g3
+        gamma1 = rows[o + 6] + s1 - z3 * e1
+        gamma2 = rows[o + 7] + s2 - z3 * e2
+        base = hx * x + hy * y + hz * zc - 2.0 * mu * (px * x + py * y + pz * zc) + z3 * near
+        c11 = rows[o + 10] + 2.0 * mu * (b0 * mb0 + b1 * mb1 + b2 * mb2) + base + f3 * e1 * e1
+        c12 = rows[o + 11] + 2.0 * mu * (b0 * md0 + b1 * md1 + b2 * md2) + f3 * e1 * e2
+        c22 = rows[o + 12] + 2.0 * mu * (d0 * md0 + d1 * md1 + d2 * md2) + base + f3 * e2 * e2
         squared = inv * inv
         c11 *= squared
         c12 *= squared
         c22 *= squared
         h1 = -gamma1 * squared
         h2 = -gamma2 * squared
-        q1 = (rows[o + 8] + s1) * inv
-        q2 = (rows[o + 9] + s2) * inv
+        q1 = (rows[o + 8] + s1 - k3 * e1) * inv
+        q2 = (rows[o + 9] + s2 - k3 * e2) * inv
         # Functions of the force.
-        omega = data[d + OMEGA]
+        omega = cost * data[d + OMEGA]
         htt = omega
         rt = omega * t
         cos_cone = data[d + COS_CONE]
-        vers = data[d + VERS_RATE]
-        z0, z1, z2, z3 = z[at], z[at + 1], z[at + 2], z[at + 3]
-        g0, g1, g2, g3 = 1.0 / g[at], 1.0 / g[at + 1], 1.0 / g[at + 2], 1.0 / g[at + 3]
-        round_ = omega + (z0 + z2 * cos_cone + z3 * (1.0 - vers)) * inv
+        z0, z1, z2 = z[at], z[at + 1], z[at + 2]
+        g0, g1, g2 = 1.0 / g[at], 1.0 / g[at + 1], 1.0 / g[at + 2]
+        round_ = omega + (z0 + z2 * cos_cone) * inv
         c11 += round_
         c22 += round_
         htt += z0 * g0
         rt += kappa * g0
         k1 = kappa * g1
-        k3 = kappa_rate * g3
-        v = near - 1.0 + vers
         f1 = z1 * g1
-        f3 = z3 * g3
-        htt += f1 * near * near + f3 * v * v
-        rt -= k1 * near + k3 * v
-        across = f1 * near + f3 * v
-        h1 += across * e1
-        h2 += across * e2
-        q1 -= (k1 + k3) * e1
-        q2 -= (k1 + k3) * e2
-        f1 += f3
+        htt += f1 * near * near
+        rt -= k1 * near
+        h1 += f1 * near * e1
+        h2 += f1 * near * e2
+        q1 -= k1 * e1
+        q2 -= k1 * e2
         c11 += f1 * e1 * e1
         c12 += f1 * e1 * e2
         c22 += f1 * e2 * e2

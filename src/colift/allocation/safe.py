@@ -81,7 +81,8 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     lam = memory[o : o + 3]
     M = memory[o + 3 : o + 9]
     facing = memory[o + 9 : o + 12]
-    o += 12
+    yielded = memory[o + 12 : o + 13]
+    o += 13
     integers = memory[o : o + 2 * n + 2 * most].view(np.int64)
     order = integers[:n]
     first = integers[n : 2 * n]
@@ -155,8 +156,10 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
         rho,
         params[cycle.KAPPA],
         0.5 * params[cycle.KAPPA_RATE] * max(rho, 1.0) * delta * delta,
-        params[cycle.BOUND_H] * heavy,
-        params[cycle.BOUND_V] * heavy,
+        params[cycle.KAPPA_PAIR],
+        params[cycle.PRICE] * heavy,
+        yielded[0] != 0.0,
+        cycle.slight_cost(n, mu, rho, delta, data),
         params[cycle.TOLERANCE],
         int(params[cycle.ITERATIONS]),
         pairs,
@@ -200,9 +203,11 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     info[INFO_GAP] = math.nan
     if W > 1e-6 and mu > 0.0 and params[cycle.EQUAL] != 0.0:
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
+    reduced = balance > 1e-8 * max(1.0, sigma)
+    yielded[0] = 1.0 if reduced else 0.0
     if relaxed and cycle.breaks_a_limit(n, order, unit, params, data, T, alpha):
         return _RECOVERING
-    if balance > 1e-8 * max(1.0, sigma):
+    if reduced:
         return _FORCE_REDUCED
     if outcome == cycle.CONVERGED:
         return _CONVERGED
@@ -218,8 +223,6 @@ GIVE_WAY = 20.0
 """Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
 RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
-VERTICAL_FIRST = 20.0
-"""How much dearer vertical force is than horizontal force."""
 
 
 class Safe(AllocatorPart):
@@ -360,8 +363,7 @@ class Safe(AllocatorPart):
         head[cycle.SETTLING] = self.settling
         head[cycle.TURNING] = self.turning
         weights = self._relative_weights(n)
-        head[cycle.BOUND_H] = GIVE_WAY * float(weights.max())
-        head[cycle.BOUND_V] = head[cycle.BOUND_H] * VERTICAL_FIRST
+        head[cycle.PRICE] = GIVE_WAY * float(weights.max())
         head[cycle.TOLERANCE] = self.tolerance
         head[cycle.ITERATIONS] = self.max_iterations
         head[cycle.LIMITS] = newton.LIMITS if limited else newton.TILT - 1
@@ -395,7 +397,7 @@ class Safe(AllocatorPart):
         pairs = n * (n - 1) // 2
         limits = newton.LIMITS * n + pairs
         cables = newton.DATA + 16 + newton.ROW + 2 * newton.RHS + 2  # 2: order, first
-        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 12)
+        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 13)
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         mu = self.mu

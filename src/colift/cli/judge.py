@@ -62,9 +62,13 @@ def judge(
     """
     import shlex
 
+    from colift.errors import RecordingError
     from colift.mission.load import parse_override
 
     check_out(folder, ("judgement.json",))
+    for path in flights:  # said before anything is compiled
+        if not path.exists():
+            raise RecordingError(f"{path}: there is no such file")
 
     with loading():
         from colift import judgement

@@ -67,6 +67,7 @@ FIGURES: dict[str, Entry[Recording]] = {}
     "Path",
     "Wide: where the load should go. Thin: where it went; the squares are the load and the "
     "dots the drones at the times given, with their cables. All axes have the same scale.",
+    needs=("load",),
 )
 def path(recording: Recording) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 4.8))
@@ -81,7 +82,7 @@ def path(recording: Recording) -> Figure:
     "Position error",
     "The load's position less its reference, by component. The pale band is plus and minus the "
     "distance between the two, so it touches whatever component carries the whole error.",
-    needs=("reference",),
+    needs=("load", "reference"),
 )
 def position_error(recording: Recording) -> Figure:
     return _over_time(recording, panels.position_error)

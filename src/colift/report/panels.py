@@ -403,8 +403,8 @@ def path(axes: Any, recording: Recording) -> None:
         axes.text(
             x, y, z, f"\u00a0\u00a0 {flight.time[row]:.3g} s", fontsize=8, color="#444444", va="top"
         )
-    places = drones.reshape(-1, 3)
-    _equal_box(axes, np.concatenate([wanted, flown, places[np.isfinite(places).all(axis=1)]]))
+    points = np.concatenate([wanted, flown, drones.reshape(-1, 3)])
+    _equal_box(axes, points[np.isfinite(points).all(axis=1)])
     for name in "xyz":
         getattr(axes, f"set_{name}label")(f"{name} (m)", labelpad=0.0)
         axes.tick_params(axis=name, pad=0.0)
@@ -416,9 +416,10 @@ def snapshots(flown: Array, apart: float, most: int = 4) -> list[int]:
     out = np.array([np.cos(azimuth), np.sin(azimuth)])
     right = [-out[1], out[0], 0.0]
     up = [*(-np.sin(elevation) * out), np.cos(elevation)]
-    candidates = np.linspace(0, len(flown) - 1, min(61, len(flown))).astype(int)
+    known = np.flatnonzero(np.isfinite(flown).all(axis=1))
+    candidates = known[np.linspace(0, len(known) - 1, min(61, len(known))).astype(int)]
     seen = flown @ np.array([right, up]).T
-    rows = [0]
+    rows = [int(candidates[0])]
     while len(rows) < most:
         gaps = np.linalg.norm(seen[candidates, None] - seen[rows], axis=2).min(axis=1)
         if gaps.max() < apart:

@@ -142,10 +142,10 @@ def _shot(page: Page, time: float) -> bytes:
 @contextmanager
 def _opened(data: Mapping[str, Any], look: Look) -> Iterator[Page]:
     """The page, bare of all but the scene, with its first picture drawn."""
-    from playwright.sync_api import Error
-
     width, height = look.size
     with tempfile.TemporaryDirectory() as folder, browser() as started:
+        from playwright.sync_api import Error
+
         file = Path(folder) / "replay.html"
         write_page(file, data, bare=True, theme=look.theme, camera=look.camera)
         page = started.new_page(viewport={"width": width, "height": height})
