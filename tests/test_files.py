@@ -96,7 +96,10 @@ def test_standard_output_without_room(tmp_path: Path) -> None:
 
 def test_a_folder_with_something_else_is_not_written_into(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("chapter one")
-    for command in (("run", "hover"), ("judge", "x.h5"), ("reproduce",)):
+    few = ("--seeds", "1", "--set", "timing.duration=0.1")
+    for command in (
+        ("run", "hover"), ("judge", "x.h5"), ("reproduce",), ("sweep", "hover", "--over", "allocation.mu=0.1,0.2", *few),
+    ):  # fmt: skip
         line = one_line(colift(*command, "--out", str(tmp_path)))
         assert f"--out {tmp_path}: is not empty and holds no results of this command" in line
     line = one_line(colift("run", "hover", "--out", str(tmp_path / "thesis.tex")))

@@ -125,7 +125,7 @@ def test_means_are_over_time_and_not_over_rows() -> None:
     directions = np.tile([0.0, 0.0, -1.0], (5, 1, 1))
     found = answers(directions, tensions, time).numbers
     assert found["mean_total_tension_N"] == pytest.approx(
-        (0.2 * 1.0 + 0.45 * 1.0 + 1.6 * 3.0) / 2.25
+        (0.2 * 1.0 + 0.8 * 2.0 + 0.8 * 3.0) / 1.8  # trapezoids
     )
     assert found["tension_ratio"] == pytest.approx(1.0)
     assert math.isnan(found["min_angle_deg"])

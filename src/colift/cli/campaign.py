@@ -14,7 +14,15 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
-from colift.cli.base import EXIT_ERROR, EXIT_FAILED, EXIT_INTERRUPTED, EXIT_LOST, err, out
+from colift.cli.base import (
+    EXIT_ERROR,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    EXIT_LOST,
+    check_out,
+    err,
+    out,
+)
 
 if TYPE_CHECKING:
     from colift.campaign.engine import Outcome, Progress
@@ -96,6 +104,7 @@ def fly(
     """Fly what the folder does not hold yet, with a bar of flights; on Ctrl-C say how to go on."""
     from colift.campaign import engine
 
+    check_out(folder, (FILE,))
     try:
         with flights(title) as advance:
             return engine.run(
