@@ -1,6 +1,8 @@
-"""Fly and write the tables of docs/theory/control.md: what each part buys, alone and together.
+"""Write the tables of docs/theory/control.md: what each part buys, alone and together.
 
-python docs/figures/coping.py [--seeds 5]
+python docs/figures/coping.py [--fly] [--seeds 5]
+
+From ``coping.json`` beside this file, which ``--fly`` makes first.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from pages import fill, table
+from pages import fill, stored, table
 
 import colift
 from colift.campaign import stress
@@ -90,26 +92,42 @@ def lose(kind: str, overrides: Overrides) -> str:
     return f"{shares.text(len(held), flown)}, {100.0 * far:.0f} cm, {near:.0f}°"
 
 
+def measure(seeds: Iterable[int]) -> dict[str, list[list[str]]]:
+    """Header and lines of each table."""
+    return {
+        "coping": [
+            ["", *CONTROLLERS],
+            *(
+                [name, *(fly({**case, **controller}, seeds) for controller in CONTROLLERS.values())]
+                for name, case in CASES.items()
+            ),
+        ],
+        "without": [
+            ["all at once", "load +50 %", "load -50 %"],
+            *(
+                [name, *(fly({**change, "truth.load_mass_factor": f}, seeds) for f in (1.5, 0.5))]
+                for name, change in WITHOUT.items()
+            ),
+        ],
+        "losses": [
+            ["all at once, then one is lost", "load +50 %", "load as told"],
+            *(
+                [kind, *(lose(kind, {"truth.load_mass_factor": factor}) for factor in (1.5, 1.0))]
+                for kind in ("cable-cut", "drone-lost")
+            ),
+        ],
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--fly", action="store_true")
     parser.add_argument("--seeds", type=int, default=5)
-    seeds = range(1000, 1000 + parser.parse_args().seeds)
-    lines = [
-        [name, *(fly({**case, **controller}, seeds) for controller in CONTROLLERS.values())]
-        for name, case in CASES.items()
-    ]
-    fill("theory/control.md", "coping", table(["", *CONTROLLERS], lines))
-    lines = [
-        [name, *(fly({**change, "truth.load_mass_factor": f}, seeds) for f in (1.5, 0.5))]
-        for name, change in WITHOUT.items()
-    ]
-    fill("theory/control.md", "without", table(["all at once", "load +50 %", "load -50 %"], lines))
-    lines = [
-        [kind, *(lose(kind, {"truth.load_mass_factor": factor}) for factor in (1.5, 1.0))]
-        for kind in ("cable-cut", "drone-lost")
-    ]
-    header = ["all at once, then one is lost", "load +50 %", "load as told"]
-    fill("theory/control.md", "losses", table(header, lines))
+    count = parser.parse_known_args()[0].seeds
+    for name, (header, *lines) in stored(
+        __file__, lambda: measure(range(1000, 1000 + count))
+    ).items():
+        fill("theory/control.md", name, table(header, lines))
 
 
 if __name__ == "__main__":
