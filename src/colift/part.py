@@ -10,9 +10,9 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.extras import install
 from colift.team import Team
 from colift.wording import problems_of
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 Vector = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -114,6 +117,18 @@ class Part(BaseModel, metaclass=_PartType):
     def check(self, team: Team) -> list[tuple[str, str]]:
         """Problems that depend on the team, as ``(field, message)``; empty when all is well."""
         return self.wrong_lengths(team.n)
+
+    def conflicts(self, team: Team) -> list[tuple[str, str]]:
+        """Limits that this team cannot keep in flight, as for :meth:`check`; such a mission is refused too."""
+        return []
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        """What is likely to go wrong with this part in a valid mission, as ``(field, message)``.
+
+        The field is one of the part's own (or ``kind``); the message names the other one. Nothing is
+        refused for it: it is told before the flight.
+        """
+        return []
 
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
         """Problems with the physics step or the length of the flight (s), as for :meth:`check`."""

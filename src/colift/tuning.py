@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel, Field
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 RATE_MARGIN = math.radians(60.0)
 """Phase margin of the body-rate loop."""
@@ -56,3 +61,69 @@ class Delays(BaseModel):
         rate = (0.5 * math.pi - RATE_MARGIN) / tau
         velocity = (0.5 * math.pi - VELOCITY_MARGIN) / (tau + 2.0 / rate)
         return Bandwidths(rate, 0.25 * rate, velocity, 0.25 * velocity)
+
+    def delay_warnings(self, mission: Mission, layer: str) -> Iterable[tuple[str, str]]:
+        """Where the part of a layer is told less than what the sensors, motors and timing of a mission have."""
+        delays = mission.sensing.delays()
+        for sensor in getattr(self, "senses", ()):
+            yield from shorter("delay", self.delay, f"sensing.{sensor}_delay", delays[sensor])
+        yield from lag_warnings(self.lag, mission)
+        yield from shorter("period", self.period, f"timing.{layer}", getattr(mission.timing, layer))
+
+
+def shorter(field: str, told: float, other: str, real: float) -> Iterable[tuple[str, str]]:
+    """A warning where a part is told less time than there is."""
+    if told < real - 1e-9:
+        message = f"is {told:g} s, but {other} is {real:g} s: the part's gains and predictions are for less"
+        yield field, message
+
+
+def lag_warnings(told: float, mission: Mission) -> Iterable[tuple[str, str]]:
+    """A warning where the lag that a part is told is far from that of the motors."""
+    real = mission.actuation.motor_lag()
+    if abs(told - real) > max(0.5 * real, 1e-3):
+        setting = f"actuation of kind {mission.kinds['actuation']} has a lag of {real:g} s"
+        yield "lag", f"is {told:g} s, but {setting}: the controller is tuned for other motors"
+
+
+def loop_growth(
+    gain: float,
+    slope: float,
+    inertia: float,
+    *,
+    period: float,
+    delay: float = 0.0,
+    lag: float = 0.0,
+) -> float:
+    """Factor by which a turn about one axis grows in a control period; above 1 it diverges.
+
+    Of ``J dOmega/dt = tau`` under the sampled law ``tau = -gain (Omega + slope theta / 2)`` (a quaternion holds half
+    of the angle), small angles, with the motors' ``lag`` and measurements that are ``delay`` (s) old: the
+    spectral radius of the loop from one period to the next.
+    """
+    t = period
+    decay = math.exp(-t / lag) if lag > 0.0 else 0.0
+    rest = lag * (1.0 - decay)  # integral of the decay, and its integral
+    rest2 = lag * (t - rest)
+    # theta, Omega, torque that acts
+    A = np.array([[1.0, t, rest2 / inertia], [0.0, 1.0, rest / inertia], [0.0, 0.0, decay]])
+    B = np.array([(0.5 * t * t - rest2) / inertia, (t - rest) / inertia, 1.0 - decay])
+    whole = min(int(delay / t + 1e-9), LONGEST)
+    part = min(max(delay / t - whole, 0.0), 1.0) if whole < LONGEST else 0.0
+    size = 3 + 2 * (whole + 1)
+    M = np.zeros((size, size))
+    law = np.zeros(size)
+    feedback = -gain * np.array([0.5 * slope, 1.0])
+    now = 0 if whole == 0 else 3 + 2 * (whole - 1)
+    law[now : now + 2] += (1.0 - part) * feedback
+    law[3 + 2 * whole :] += part * feedback
+    M[:3, :3] = A
+    M[:3] += np.outer(B, law)
+    M[3:5, :2] = np.eye(2)
+    for k in range(whole):
+        M[5 + 2 * k : 7 + 2 * k, 3 + 2 * k : 5 + 2 * k] = np.eye(2)
+    return float(np.abs(np.linalg.eigvals(M)).max())
+
+
+LONGEST = 50
+"""Most control periods of delay that :func:`loop_growth` looks at."""

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+from time import process_time
 
 import numpy as np
 import pytest
 
+from colift.actuation.motors import Motors
 from colift.allocation._feasibility import (
     feasibility,
+    formations,
+    limits_of,
     most_cables,
     spread_formation,
     widest_angle,
+    widest_formation,
 )
+from colift.allocation._heaviest import Limits, best_tensions, extreme
 from colift.allocation.safe import Safe, SafeAllocator
-from colift.geometry import pairwise_angles
+from colift.geometry import pairwise_angles, ring
 from colift.team import Team
 
 WIDEST = {  # degrees, best found, for cones of 45, 60 and 75 degrees
@@ -83,6 +89,105 @@ def test_a_load_beyond_the_margin_is_a_conflict():
     assert not found.ok
     assert found.margin < 1.0
     assert "weight" in found.conflicts[0]
+
+
+def test_what_binds_is_named_default_or_not():
+    """An unset tension_max of 5 N is a limit like any other."""
+    found = feasibility(Team.uniform(4), Safe(min_angle_deg=40.0))
+    assert str(found.binding[0]) == "allocation.tension_max = 5 N (the default)"
+    assert found.binding[0].price == pytest.approx(1.0, abs=0.01)
+    assert str(found.binding[1]) == "allocation.min_angle_deg = 40 deg"
+    tenth = feasibility(Team.uniform(4), Safe(min_angle_deg=44.0))
+    assert tenth.heaviest < found.heaviest
+    strong = feasibility(Team.uniform(4), Safe(tension_max=100.0), Motors(max_thrust=2.0))
+    assert strong.binding[0].path == "actuation.max_thrust"
+    assert not strong.binding[0].default
+    told = feasibility(
+        Team.uniform(4), Safe(tension_max=100.0, max_thrust=8.0), Motors(max_thrust=2.1)
+    )
+    assert told.binding[0].path == "allocation.max_thrust"
+
+
+def held_by_ring(cone, *, mass=0.5, thrust):
+    """Weight that four cables on a ring hold with this thrust a drone: |m g e3 - T alpha| = f."""
+    own = mass * 9.81
+    c, s = math.cos(cone), math.sin(cone)
+    tension = math.sqrt(thrust**2 - (own * s) ** 2) - own * c
+    return 4.0 * tension * c
+
+
+def test_thrust_counts_the_tilt_of_the_cables():
+    narrow = math.asin(math.sin(math.radians(15.0)) / math.sin(math.pi / 4.0))
+    found = feasibility(Team.uniform(4), Safe(tension_max=100.0), Motors(max_thrust=1.87))
+    assert found.heaviest == pytest.approx(held_by_ring(narrow, thrust=7.48), rel=3e-3)
+    assert found.heaviest < 4.0 * (7.48 - 0.5 * 9.81)  # what vertical cables would hold
+    assert found.heaviest <= limits_of(Team.uniform(4), Safe(), np.full(4, 7.48)).bound()
+
+
+def test_tilt_and_unequal_drones_count():
+    """A strong drone takes the middle; one that may hardly tilt pulls its cable where it can."""
+    team = Team.uniform(5)
+    even = feasibility(team, Safe(tension_max=2.0)).heaviest
+    caps = [2.0, 2.0, 6.0, 2.0, 2.0]
+    strong = feasibility(team, Safe(tension_max=caps)).heaviest
+    assert strong > even + 3.9  # all of its 4 N more, and a narrower place for it
+    free = feasibility(team, Safe(tension_max=50.0, max_thrust=12.0)).heaviest
+    tilted = feasibility(team, Safe(tension_max=50.0, max_thrust=12.0, max_tilt_deg=8.0))
+    assert tilted.heaviest < 0.95 * free
+    assert tilted.binding[0].path in ("allocation.max_tilt_deg", "allocation.max_thrust")
+
+
+def test_tensions_along_given_cables_are_those_of_a_linear_programme():
+    scipy = pytest.importorskip("scipy.optimize")
+    rng = np.random.default_rng(3)
+    solved = 0
+    for _ in range(60):
+        n = int(rng.integers(2, 12))
+        d = rng.normal(size=(n, 3))
+        d[:, 2] = -np.abs(d[:, 2]) - 0.3
+        d /= np.linalg.norm(d, axis=1, keepdims=True)
+        limits = Limits(np.full(n, 5.0), rng.random(n), 2.0 + 5.0 * rng.random(n), 7.0 + 8.0 * rng.random(n),
+                        math.radians(89.0), 0.0)  # fmt: skip
+        weight, tensions = best_tensions(limits, d)
+        high = limits.ceiling(-d[:, 2])
+        if np.any(high <= limits.low):
+            assert math.isnan(weight)
+            continue
+        bounds = list(zip(limits.low, high, strict=True))
+        exact = scipy.linprog(d[:, 2], A_eq=d[:, :2].T, b_eq=[0.0, 0.0], bounds=bounds)
+        if exact.status == 2:
+            assert math.isnan(weight)
+            continue
+        solved += 1
+        assert weight == pytest.approx(-exact.fun, rel=1e-6)
+        assert np.all(tensions >= limits.low - 1e-9)
+        assert np.all(tensions <= high + 1e-9)
+    assert solved > 20
+
+
+@pytest.mark.parametrize("n", [2, 3, 5, 9, 30, 200])
+def test_the_question_in_flight_is_bounded_and_agrees_with_the_search(n):
+    settings = Safe(min_angle_deg=min(30.0, 100.0 / math.sqrt(n)))
+    motors = np.full(n, 9.0)
+    limits = limits_of(Team.uniform(n), settings, motors)
+    now = (
+        widest_formation(n, limits.cone, enough=1.05 * limits.min_angle)[0]
+        if n < 100
+        else ring(n, 1.0)
+    )
+    best = extreme(limits, formations(n, limits)).weight if n <= 9 else 0.85 * limits.bound()
+    for share, holds in ((0.5, True), (0.96 if n <= 9 else 0.9, True), (1.0 / 0.85, False)):
+        team = Team.uniform(n, load_mass=share * best / 9.81)
+        times = []
+        for _ in range(5):
+            begin = process_time()
+            found = settings.cannot_hold(team, motors, now)
+            times.append(process_time() - begin)
+        assert (found == []) is holds, (share, found)
+        assert min(times) < 0.02
+    if not holds:
+        assert "tension_max" in found[0]
+        assert f"{team.load_mass * 9.81:.4g} N" in found[0]
 
 
 @pytest.mark.parametrize(("angle", "cone", "least"), [(30, 60, 16), (30, 45, 10), (59, 60, 6)])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from time import process_time
+
 import numpy as np
 import pytest
 
 import colift
 from colift.allocation import Status
+from colift.allocation.base import Allocator
 from colift.detection.residuals import Residuals
 from colift.errors import MissionError
 from colift.fault.base import LOAD
@@ -333,8 +336,28 @@ def test_the_load_is_not_brought_down_while_the_rest_can():
 
 
 def test_weak_motors_bring_it_down_too():
-    heavy = {"load.mass": 0.8, "allocation.tension_max": 8.0, "actuation.max_thrust": 1.75,
+    heavy = {"load.mass": 0.8, "allocation.tension_max": 8.0, "actuation.max_thrust": 1.8,
              "allocation.mu": 1.2}  # fmt: skip
     flight = Flight(load_mission(mission("real", n=4).resolved(), heavy))
     assert flight._cannot_carry([0, 1, 2, 3]) == ""
-    assert "3 drones lift less than 0.6407 kg" in flight._cannot_carry([0, 1, 2])
+    assert "3 drones lift less than 0.7018 kg" in flight._cannot_carry([0, 1, 2])
+    # With 1.95 N a motor they would lift 0.885 kg on vertical cables; 30 degrees apart they do not hold 0.88 kg.
+    tilted = {**heavy, "load.mass": 0.88, "actuation.max_thrust": 1.95}
+    found = Flight(load_mission(mission("real", n=4).resolved(), tilted))._cannot_carry([0, 1, 2])
+    assert "the drones' thrust (together 23.4 N) and min_angle_deg = 30" in found
+
+
+def test_nobody_calls_the_allocator_to_ask_who_can_carry(monkeypatch):
+    """A user's allocator must not be run in the middle of a flight, and the question is answered at once."""
+    flight = Flight(too_heavy())
+    flight.advance(1.0)
+
+    def never(*arguments):
+        raise AssertionError("the allocator was called")
+
+    monkeypatch.setattr(Allocator, "allocate", never)
+    begin = process_time()
+    assert "tension_max" in flight._cannot_carry([0, 1])
+    assert process_time() - begin < 0.05
+    flight.lose([2])
+    assert flight.descent

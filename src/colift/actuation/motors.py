@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -123,6 +123,7 @@ class Motors(ActuationPart):
 
     kernel = _turn
     per_drone = ("max_thrust",)
+    thrust_setting: ClassVar[str] = "max_thrust"
 
     arm_length: Annotated[float, Field(gt=0.0, le=5.0)] = 0.2
     """From the centre to a rotor, m."""
@@ -146,7 +147,16 @@ class Motors(ActuationPart):
             return problems
         if self.min_thrust >= np.min(self.max_thrust):
             return [("min_thrust", f"must be below max_thrust = {np.min(self.max_thrust):g} N")]
-        spare = 4.0 * np.asarray(self.max_thrust) - team.masses * team.gravity
+        return []
+
+    def motor_lag(self) -> float:
+        return self.time_constant
+
+    def thrust_limits(self, team: Team) -> Vector:
+        return np.array(np.broadcast_to(4.0 * np.asarray(self.max_thrust, dtype=float), team.n))
+
+    def conflicts(self, team: Team) -> list[tuple[str, str]]:
+        spare = self.thrust_limits(team) - team.masses * team.gravity
         if np.min(spare) <= 0.0:
             i = int(np.argmin(spare))
             own = team.masses[i] * team.gravity

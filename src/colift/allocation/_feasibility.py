@@ -1,6 +1,6 @@
 """Can these drones, within these limits, hold this load? Formations, widest angles, named conflicts.
 
-For set-up and analysis, in plain NumPy; nothing here runs in a control cycle.
+For set-up and analysis, in plain NumPy. Only :func:`cannot_hold`, which is bounded, is asked in flight.
 """
 
 from __future__ import annotations
@@ -9,16 +9,20 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.allocation._heaviest import Limits, best_tensions, extreme
+from colift.allocation._hover import hover_conflicts, thrusts_of
 from colift.geometry import pairwise_angles, ring
 from colift.team import Team
 
 if TYPE_CHECKING:
+    from colift.actuation.base import ActuationPart
     from colift.allocation.safe import Safe
+    from colift.part import Part
 
 Array = NDArray[np.float64]
 
@@ -37,21 +41,25 @@ class Feasibility:
     Attributes
     ----------
     ok : bool
-        No conflict, and the load's weight lies inside ``(lightest, heaviest)``.
+        No conflict: the allocator holds the load's weight within the limits, and the motors can follow.
     lightest, heaviest : float
-        Least and largest weight that the cables can balance in hover, N.
+        Least and largest weight that the cables can balance in hover, N, in the best formation that was found.
     margin : float
         ``heaviest / weight``; below 1 the load cannot be lifted.
+    binding : tuple of Binding
+        What keeps the load from being heavier, the costliest first.
     widest_angle : float
         Widest least angle between two cables that was found for this cone, rad.
     most_cables : tuple of int
         How many cables the least angle allows in this cone: found, and never more than.
     conflicts : tuple of str
-        Pairs of limits that cannot hold together, by name and value.
+        Why not, by the names and values of the limits.
     directions : (n, 3) array
-        A formation in hover within all limits, drone to load (the least bad one after a conflict).
+        The allocator's formation in hover, drone to load (the least bad one after a conflict).
     tensions : (n,) array
         Its tensions, N.
+    thrusts, thrust_limits : (n,) array
+        Thrust that each drone needs in it, and the most that it can give, N (inf where nothing limits it).
 
     """
 
@@ -59,52 +67,271 @@ class Feasibility:
     lightest: float
     heaviest: float
     margin: float
+    binding: tuple[Binding, ...]
     widest_angle: float
     most_cables: tuple[int, int]
     conflicts: tuple[str, ...]
     directions: Array
     tensions: Array
+    thrusts: Array
+    thrust_limits: Array
 
 
-def feasibility(team: Team, settings: Safe) -> Feasibility:
-    """Judge hover by the allocator itself: ask it for the load's weight, for nothing, for too much.
+@dataclass(frozen=True)
+class Binding:
+    """A limit that keeps the load from being heavier.
 
-    Where the force cannot be had, the allocator answers with the nearest it can do, which is the limit
-    wanted here (to within its barrier, about one part in a thousand).
+    Attributes
+    ----------
+    path : str
+        Of the field in a mission, such as ``allocation.tension_max``.
+    value : object
+    unit : str
+    default : bool
+        Whether that is the field's default.
+    price : float
+        Share by which the heaviest load changes for a small share of the limit; negative: with less of it.
+
     """
-    from colift.allocation.safe import SafeAllocator
 
-    conflicts = [message for _, message in conflicts_of(team, settings)]
-    cone, least = math.radians(settings.max_cone_deg), math.radians(settings.min_angle_deg)
-    start, angle = widest_formation(team.n, cone, enough=least + math.radians(2.0))
-    relaxed = settings.model_copy(update={"settling": 0.02, "max_rate": 50.0})
-    weight = team.load_mass * team.gravity
-    held = []
-    for wanted in (weight, 0.0, 10.0 * (weight + float(np.sum(settings.tension_caps(team.n))))):
-        allocator = SafeAllocator.unchecked(team, relaxed)
-        allocator.dt = 0.01
-        allocator.reset(directions=start)
-        for _ in range(300):
-            answer = allocator.allocate([0.0, 0.0, wanted])
-        held.append((-float(answer.tensions @ answer.directions[:, 2]), answer))
-    (reached, hover), (lightest, _), (heaviest, _) = held
-    if not conflicts and abs(reached - weight) > 1e-6 * weight:
-        what = "heavier" if weight > reached else "lighter"
-        conflicts.append(
-            f"the load's weight of {weight:.4g} N is {what} than what the limits allow in hover "
-            f"({lightest:.4g} to {heaviest:.4g} N)"
-        )
+    path: str
+    value: Any
+    unit: str
+    default: bool
+    price: float
+
+    def __str__(self) -> str:
+        value = f"{self.value:g}" if isinstance(self.value, int | float) else str(self.value)
+        return f"{self.path} = {value}{self.unit}{' (the default)' if self.default else ''}"
+
+
+def limits_of(team: Team, settings: Safe, thrusts: Array | None = None) -> Limits:
+    """The limits of cables and drones; ``thrusts`` (n,): what the drones' motors can give, N."""
+    told = settings.thrust_limits(team)
+    return Limits(
+        weights=team.masses * team.gravity,
+        low=settings.tension_floors(team.n),
+        high=settings.tension_caps(team.n),
+        thrust=told if thrusts is None else np.minimum(told, thrusts),
+        cone=math.radians(settings.max_cone_deg),
+        min_angle=math.radians(settings.min_angle_deg),
+        tilt=math.radians(settings.max_tilt_deg or 90.0),
+    )
+
+
+def feasibility(
+    team: Team,
+    settings: Safe,
+    actuation: ActuationPart | None = None,
+    start: Array | None = None,
+    dt: float = 0.01,
+) -> Feasibility:
+    """Judge hover: what the best formation holds, and whether the allocator's own can be flown.
+
+    The heaviest and the lightest load are found by optimisation over formations. Whether this mission's load
+    is held is asked of the allocator itself, every ``dt`` s from the formation ``start`` (n, 3): it may spread the cables wider
+    than the heaviest load would allow.
+    """
+    n, weight = team.n, team.load_mass * team.gravity
+    motors = np.full(n, np.inf) if actuation is None else actuation.thrust_limits(team)
+    limits = limits_of(team, settings, motors)
+    conflicts = [message for _, message in settings.conflicts(team)]
+    if actuation is not None:
+        conflicts += [message for _, message in actuation.conflicts(team)]
+    starts = formations(n, limits)
+    if start is None:
+        start = widest_formation(n, limits.cone, enough=limits.min_angle + math.radians(2.0))[0]
+    hover = settings.hover(team, start, dt)
+    heaviest, lightest = 0.0, math.nan
+    binding: tuple[Binding, ...] = ()
+    if len(starts):
+        heaviest, binding = _heaviest(team, settings, actuation, limits, starts)
+        lightest = extreme(limits, starts, heaviest=False).weight
+    if not conflicts:
+        found = hover_conflicts(team, hover, motors)
+        if "allocation" in found and binding:
+            found["allocation"] += f"; what limits: {', '.join(map(str, binding))}"
+        conflicts = list(found.values())
     return Feasibility(
         ok=not conflicts,
         lightest=lightest,
         heaviest=heaviest,
-        margin=heaviest / weight,
-        widest_angle=max(angle, widest_angle(team.n, cone)),
-        most_cables=most_cables(least, cone),
+        margin=heaviest / weight if weight > 0.0 else math.inf,
+        binding=binding,
+        widest_angle=max(
+            float(pairwise_angles(start).min()) if n > 1 else math.pi,
+            widest_angle(n, limits.cone),
+        ),
+        most_cables=most_cables(limits.min_angle, limits.cone),
         conflicts=tuple(conflicts),
         directions=hover.directions,
         tensions=hover.tensions,
+        thrusts=thrusts_of(team, hover),
+        thrust_limits=limits.thrust,
     )
+
+
+def binding_limits(
+    team: Team, settings: Safe, actuation: ActuationPart | None = None
+) -> tuple[Binding, ...]:
+    """What keeps the load from being heavier, the costliest first; none where nothing is held at all."""
+    motors = None if actuation is None else actuation.thrust_limits(team)
+    limits = limits_of(team, settings, motors)
+    starts = formations(team.n, limits)
+    return _heaviest(team, settings, actuation, limits, starts)[1] if len(starts) else ()
+
+
+def _heaviest(
+    team: Team, settings: Safe, actuation: ActuationPart | None, limits: Limits, starts: Array
+) -> tuple[float, tuple[Binding, ...]]:
+    """The heaviest load, N, and the limits with a price of more than a hundredth, the costliest first."""
+    best = extreme(limits, starts)
+    if not math.isfinite(best.weight):
+        return 0.0, ()
+    found = []
+    for name, price in best.prices.items():
+        part: Part = settings
+        if name == "max_thrust" and actuation is not None:
+            by_motors = actuation.thrust_limits(team) < settings.thrust_limits(team)
+            if by_motors.any():
+                part, name = actuation, actuation.thrust_setting
+        if abs(price) < 0.01 or getattr(part, name, None) is None:
+            continue
+        value = getattr(part, name)
+        default = value == type(part).model_fields[name].default
+        unit = " deg" if name.endswith("_deg") else " N"
+        found.append(Binding(f"{part.layer}.{name}", value, unit, default, price))
+    return best.weight, tuple(sorted(found, key=lambda each: -abs(each.price)))
+
+
+def cannot_hold(team: Team, settings: Safe, thrusts: Array, directions: Array) -> list[str]:
+    """Why the team cannot hold the load in hover within the limits; empty when some formation does.
+
+    Bounded, a few milliseconds: it may be asked in flight. ``thrusts`` (n,), N, are what the motors give,
+    ``directions`` (n, 3) the cables' now.
+    """
+    n, weight = team.n, team.load_mass * team.gravity
+    limits = limits_of(team, settings, thrusts)
+    most = limits.bound()
+    if most >= weight:
+        most = _quickly_held(limits, weight, directions)
+    found = []
+    if most < weight:
+        named = f"tension_max (together {float(np.sum(limits.high)):.4g} N)"
+        if np.any(limits.ceiling(np.ones(n)) < limits.high):
+            named += f" and the drones' thrust (together {float(np.sum(limits.thrust)):.4g} N)"
+        found.append(
+            f"{n} cables hold {max(most, 0.0):.4g} N in hover within {named} and min_angle_deg = "
+            f"{settings.min_angle_deg:g}; the load weighs {weight:.4g} N"
+        )
+    lowest = float(np.sum(limits.low)) * math.cos(limits.cone)
+    if lowest > weight:
+        found.append(f"tension_min pulls {lowest:.4g} N upwards, the load weighs {weight:.4g} N")
+    return found
+
+
+def _quickly_held(limits: Limits, weight: float, directions: Array) -> float:
+    """What the best formation holds that a short search finds, N; it ends where that is enough."""
+    n, most = limits.weights.size, 0.0
+    narrow = list(_rings(n, limits))
+    for formation in narrow:  # in balance when all pull alike
+        even = float(np.min(limits.ceiling(-formation[:, 2])))
+        across = np.abs(formation[:, :2].sum(axis=0)).max()
+        if even > limits.low.max() and across < 1e-9:
+            most = max(most, -even * float(formation[:, 2].sum()))
+            if most >= weight:
+                return most
+    if n <= POLISHED:
+        known = [*(list(_rings(n, limits, 1.15)) or narrow), directions]
+        kept = [each for each in known if is_within(limits, each)]
+        if np.ptp(limits.ceiling(np.ones(n))) > 0.0:
+            kept += [_strongest_inside(limits, each) for each in kept]
+        held = extreme(limits, np.array(kept), steps=QUICK, enough=weight).weight if kept else most
+        return max(most, held) if held == held else most
+    for formation in (*narrow, directions):
+        held = best_tensions(limits, _strongest_inside(limits, formation))[0]
+        most = max(most, held) if held == held else most
+        if most >= weight:
+            break
+    return most
+
+
+def _strongest_inside(limits: Limits, formation: Array) -> Array:
+    """The formation (n, 3) with the drones that can pull most in the most upright places."""
+    placed = np.empty_like(formation)
+    strength = np.argsort(limits.ceiling(np.ones(len(formation))))
+    placed[strength] = formation[np.argsort(-formation[:, 2])]
+    return placed
+
+
+POLISHED = 10
+"""Most cables for which a team in flight looks for a better formation than those that are known."""
+QUICK = 25
+"""Steps of that search."""
+FORMATIONS = 24
+"""Formations from which the heaviest load is looked for."""
+
+
+def _rings(n: int, limits: Limits, wider: float = 1.0) -> Iterator[Array]:
+    """Narrow formations in the cone: one ring, or rings as full as the least angle allows around 1 to 5 cables.
+
+    ``wider``: by which factor the angles are.
+    """
+    gap = wider * _ROOM * limits.min_angle
+    for inside in sorted({*range(1, min(n, 6)), n}):
+        wide = 0.0 if inside == 1 else math.sin(0.5 * gap) / math.sin(math.pi / inside)
+        if wide >= 1.0:
+            continue
+        cone, left = math.asin(wide), n
+        rings: list[Array] = []
+        while left > 0 and cone < limits.cone:
+            room = (
+                1
+                if cone < 0.5 * gap
+                else int(math.pi / math.asin(math.sin(0.5 * gap) / math.sin(cone)) + 1e-9)
+            )
+            room = min(room, left) if rings else inside
+            single = np.array([[-math.sin(cone), 0.0, -math.cos(cone)]])
+            rings.append(ring(room, cone) if room > 1 else single)
+            left -= room
+            cone += gap
+        if left == 0:
+            yield np.vstack(rings)
+
+
+_ROOM = 1.0 + 1e-6
+
+
+def is_within(limits: Limits, directions: Array) -> bool:
+    """Whether directions (n, 3) keep the least angle and the cone."""
+    if np.any(-directions[:, 2] < math.cos(limits.cone)):
+        return False
+    return len(directions) < 2 or float(pairwise_angles(directions).min()) > limits.min_angle
+
+
+def formations(n: int, limits: Limits) -> Array:
+    """Formations (k, n, 3) within the limits, to look for the best from: different ones, drones in different places."""
+    found = [each.copy() for each in _spread_formations(n, limits.cone, limits.min_angle)]
+    if not found:
+        return np.zeros((0, n, 3))
+    rng = np.random.default_rng(0)
+    bases = len(found)
+    found += [_strongest_inside(limits, each) for each in found]
+    found += [found[k % bases][rng.permutation(n)] for k in range(max(0, FORMATIONS - 2 * bases))]
+    return np.array(found)
+
+
+@lru_cache(maxsize=64)
+def _spread_formations(n: int, cone: float, min_angle: float) -> tuple[Array, ...]:
+    if n == 1:
+        return (ring(1, 0.0),)
+    inner = cone * 0.999
+    spread = (_spread(start, inner, 1.03 * min_angle + 1e-3) for start in _starts(n, inner))
+    found = tuple(each for each, angle in spread if angle > min_angle * _ROOM)[: FORMATIONS // 2]
+    if not found:
+        each, angle = widest_formation(n, inner)
+        found = (each,) if angle > min_angle * _ROOM else ()
+    return found
 
 
 def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:

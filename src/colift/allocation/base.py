@@ -6,9 +6,10 @@ An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +18,13 @@ from colift.allocation._status import Status as Status
 from colift.errors import Problem, SettingError
 from colift.geometry import Array, ring, widest_gap
 from colift.jit import f8, i8, matrix, vector
-from colift.part import Part
+from colift.part import Part, Vector
 from colift.team import Team
 from colift.wording import numbers, shown
+
+if TYPE_CHECKING:
+    from colift.actuation.base import ActuationPart
+    from colift.mission.mission import Mission
 
 SIGNATURE = i8(vector, vector, f8, vector, vector, vector, matrix, vector)
 """``kernel(force, acceleration, dt, params, memory, tensions, directions, info) -> status``.
@@ -42,6 +47,14 @@ INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACT
 INFO_SIZE = 6
 
 
+HOVER_CALLS = 1000
+"""Most calls until an allocator is taken to have settled in hover; a plain Python one is asked less often."""
+HOVER_STILL = 1e-7
+"""Change of a cable's force from call to call, over the load's weight, at which it has."""
+HOVER_PERIOD = 0.01
+"""Least time between these calls, s: ten seconds in all."""
+
+
 class AllocatorPart(Part):
     """Base of all allocators: settings, kernel with :data:`SIGNATURE`, parameters and memory."""
 
@@ -53,13 +66,52 @@ class AllocatorPart(Part):
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""
         return float("nan")
 
-    def cannot_hold(self, team: Team) -> list[str]:
-        """Why its limits do not let the team hold the load in hover; empty when they do, or without limits."""
+    def cannot_hold(self, team: Team, thrusts: Vector, directions: Array) -> list[str]:
+        """Why the team cannot hold the load in hover; empty when it can, or for all that is known.
+
+        Asked in flight when drones have left, so it takes a few milliseconds at most and calls no kernel.
+        ``thrusts`` (n,) are the drones' largest, N; ``directions`` (n, 3) are those that the drones fly now.
+        """
         return []
 
     def cannot_start(self, team: Team, directions: Array) -> str:
         """Why the cables (n, 3) cannot be led from there to within its limits; empty when they can."""
         return ""
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        from colift.allocation._hover import hover_conflicts  # which reads answers
+
+        drones = mission.first_drones()
+        told, real = mission.team.of(drones), mission.true_team.of(drones)
+        changes = [float(each.value) for each in mission.events if each.field == "load.mass"]
+        real = replace(real, load_mass=max([real.load_mass, *changes]))
+        if real.gravity == 0.0 or (
+            real.load_mass <= told.load_mass and np.all(real.masses <= told.masses)
+        ):
+            return
+        hover = self.of(drones).hover(real, mission.start_directions(), mission.timing.allocation)
+        given = mission.actuation.of(drones).thrust_limits(real)
+        for message in hover_conflicts(real, hover, given).values():
+            yield "kind", f"with what the drones really weigh and carry (truth, events) {message}"
+
+    def binding(self, team: Team, actuation: ActuationPart) -> list[str]:
+        """Which limits keep the load from being heavier, by name and value, the costliest first."""
+        return []
+
+    def hover(self, team: Team, directions: Array, dt: float) -> Allocation:
+        """Its answer to the load's weight once it has settled, from these directions (n, 3); dt in s."""
+        allocator = Allocator(self, team, dt=max(dt, HOVER_PERIOD))
+        allocator.reset(directions=directions)
+        weight = [0.0, 0.0, team.load_mass * team.gravity]
+        compiled = hasattr(type(self).kernel, "py_func")
+        answer = allocator.allocate(weight)
+        for _ in range(HOVER_CALLS if compiled else HOVER_CALLS // 50):
+            before = answer.tensions[:, None] * answer.directions
+            answer = allocator.allocate(weight)
+            change = np.abs(answer.tensions[:, None] * answer.directions - before).max()
+            if change <= HOVER_STILL * weight[2]:
+                break
+        return answer
 
 
 class Allocation:

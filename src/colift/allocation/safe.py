@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,9 @@ from colift.geometry import Array, pairwise_angles, ring, widest_gap
 from colift.jit import kernel
 from colift.part import Vector
 from colift.team import Team
+
+if TYPE_CHECKING:
+    from colift.actuation.base import ActuationPart
 
 _CONVERGED = int(Status.CONVERGED)
 _ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
@@ -287,9 +290,10 @@ class Safe(AllocatorPart):
         return self
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        problems = self.wrong_lengths(team.n)
-        if problems:
-            return problems
+        return self.wrong_lengths(team.n)
+
+    def conflicts(self, team: Team) -> list[tuple[str, str]]:
+        problems = []
         if self.max_thrust is not None:
             own = team.masses * team.gravity
             weak = np.flatnonzero(0.8 * np.broadcast_to(self.max_thrust, team.n) < own)
@@ -304,8 +308,16 @@ class Safe(AllocatorPart):
                 )
         return problems + feasible.conflicts_of(team, self)
 
-    def cannot_hold(self, team: Team) -> list[str]:
-        return list(feasible.feasibility(team, self).conflicts)
+    def cannot_hold(self, team: Team, thrusts: Vector, directions: Vector) -> list[str]:
+        return feasible.cannot_hold(team, self, thrusts, directions)
+
+    def binding(self, team: Team, actuation: ActuationPart) -> list[str]:
+        return [str(each) for each in feasible.binding_limits(team, self, actuation)]
+
+    def thrust_limits(self, team: Team) -> Vector:
+        """Largest thrust of each drone (n,) as far as the allocator is told, N; inf: not limited."""
+        most = math.inf if self.max_thrust is None else self.max_thrust
+        return np.array(np.broadcast_to(np.asarray(most, dtype=float), team.n))
 
     def cannot_start(self, team: Team, directions: Array) -> str:
         if self._keeps_limits(directions):
@@ -472,7 +484,7 @@ class SafeAllocator(Allocator):
             **settings,
         )
         team = n if isinstance(n, Team) else Team.uniform(n)
-        if problems := part.check(team):
+        if problems := part.check(team) or part.conflicts(team):
             raise SettingError([Problem(name, "", message) for name, message in problems])
         super().__init__(part, team, cone_deg=cone_deg, dt=dt)
 

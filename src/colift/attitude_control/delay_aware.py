@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -14,6 +15,9 @@ from colift.math import quaternion
 from colift.part import Places, Vector, carry_rows
 from colift.team import Team
 from colift.tuning import Delays
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 YAW = 0.25
 """Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
@@ -106,6 +110,7 @@ class DelayAware(AttitudeControlPart, Delays):
     """
 
     kernel = _delay_aware
+    gain_setting: ClassVar[str] = "delay"
 
     max_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 40.0
     """Most angular acceleration in roll and pitch, rad/s^2."""
@@ -116,6 +121,17 @@ class DelayAware(AttitudeControlPart, Delays):
     """How long the attitude is predicted without a new measurement, s."""
     steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
     """Silence that is only the sensor's sampling, which the estimator makes up for, s."""
+
+    def gains(self, team: Team) -> tuple[Vector, Vector, Vector]:
+        rate = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
+        return rate * team.inertias, np.zeros((team.n, 3)), np.tile(0.5 * rate, (team.n, 1))
+
+    def made_up_for(self) -> tuple[float, float]:
+        return (self.delay, self.lag) if self.predicted else (0.0, 0.0)
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        yield from super().warnings(mission)
+        yield from self.delay_warnings(mission, "attitude_control")
 
     def params(self, team: Team) -> Vector:
         rate = self.bandwidths().rate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -40,6 +40,7 @@ class Manifold(AttitudeControlPart):
     """``s = Omega_e + rho q_e``, ``tau = -K_d s - beta sat(gamma s)``; all gains unpublished, chosen."""
 
     kernel = _manifold
+    gain_setting: ClassVar[str] = "k_d"
 
     rho: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
     """Slope of the error manifold per body axis, 1/s."""
@@ -52,3 +53,8 @@ class Manifold(AttitudeControlPart):
 
     def params(self, team: Team) -> Vector:
         return np.array([*self.rho, *self.k_d, *self.beta, *self.gamma])
+
+    def gains(self, team: Team) -> tuple[Vector, Vector, Vector]:
+        robust = np.multiply(self.beta, self.gamma)
+        K, extra, rho = (np.tile(each, (team.n, 1)) for each in (self.k_d, robust, self.rho))
+        return K, extra, rho

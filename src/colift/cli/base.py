@@ -213,6 +213,14 @@ def plain(value: Any) -> Any:
     return value
 
 
+def show_warnings(warnings: Iterable[object]) -> None:
+    """Say what a mission's parts warn of, before it flies, where it disturbs no output."""
+    for warning in warnings:
+        console(stderr=True).print(
+            f"warning: {warning}", style="yellow", markup=False, soft_wrap=True
+        )
+
+
 def emit(value: Any) -> None:
     """Print one JSON object on standard output."""
     print(json.dumps(plain(value), indent=2))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
-from colift.cli.base import EXIT_ERROR, Json, Sets, app, emit, loading, out
+from colift.cli.base import EXIT_ERROR, Json, Sets, app, emit, loading, out, show_warnings
 from colift.errors import ColiftError
 
 
@@ -22,52 +23,88 @@ def feasibility(
 ) -> None:
     """Before a flight: can these drones hold this load within these limits, and how well.
 
-    For a mission with the safe allocator, in hover. Exit code 1 if they cannot.
+    For a mission with the safe allocator, in hover: limits of cables, of pairs of cables, of drones and of
+    their motors. Exit code 1 if they cannot; `colift run` refuses such a mission.
     """
     from colift.mission.load import parse_overrides
 
     with loading():
+        import numpy as np
+
         import colift
         from colift.allocation._feasibility import SEARCHED
         from colift.allocation._feasibility import feasibility as judge
         from colift.allocation.safe import Safe
+        from colift.mission.warnings import warnings_of
 
-        loaded = colift.load_mission(mission, parse_overrides(sets))
+        loaded = colift.load_mission(mission, parse_overrides(sets), must_fly=False)
     if not isinstance(loaded.allocation, Safe):
         raise ColiftError(
             f"{loaded.name}: its allocator {loaded.kinds['allocation']!r} has no limits to judge; "
             "try --set allocation.kind=safe"
         )
-    found = judge(loaded.team, loaded.allocation)
-    weight = loaded.team.load_mass * loaded.team.gravity
+    drones = loaded.first_drones()
+    team, part = loaded.team.of(drones), loaded.allocation.of(drones)
+    found = judge(
+        team, part, loaded.actuation.of(drones), loaded.start_directions(), loaded.timing.allocation
+    )
+    warnings = [str(each) for each in warnings_of(loaded)]
+    conflicts = [*found.conflicts, *loaded.attitude_control.diverges(loaded)]
+    if not found.conflicts and (message := part.cannot_start(team, loaded.start_directions())):
+        conflicts.append(message)
+    weight = team.load_mass * team.gravity
     widest = math.degrees(found.widest_angle)
+    winds = [
+        f"disturbance.{i} ({kind})"
+        for i, (kind, each) in enumerate(
+            zip(loaded.list_kinds["disturbance"], loaded.disturbance, strict=True)
+        )
+        if each.makes_wind
+    ]
+    wind = f"in calm air: the wind of {', '.join(winds)} is not counted" if winds else ""
     if as_json:
         emit(
             {
-                "mission": loaded.name, "feasible": found.ok, "conflicts": list(found.conflicts),
+                "mission": loaded.name, "feasible": not conflicts, "conflicts": conflicts,
                 "weight_N": weight, "lightest_N": found.lightest, "heaviest_N": found.heaviest,
-                "margin": found.margin, "widest_angle_deg": widest,
+                "margin": found.margin, "binding": [asdict(each) for each in found.binding],
+                "widest_angle_deg": widest,
                 "most_cables_found": found.most_cables[0], "most_cables_bound": found.most_cables[1],
-                "tensions_N": found.tensions.tolist(),
+                "tensions_N": found.tensions.tolist(), "thrusts_N": found.thrusts.tolist(),
+                "thrust_limits_N": found.thrust_limits.tolist(), "wind": wind, "warnings": warnings,
             }
         )  # fmt: skip
     else:
-        part, n = loaded.allocation, loaded.drones.count
+        n = team.n
         most, bound = found.most_cables
         allowed = f"{most} cables (found; never more than {bound})"
         if most >= SEARCHED:
             allowed = f"{most} cables or more"
-        out.print(f"{escape(loaded.name)}: {n} drones, load of {weight:.4g} N (hover)")
+        out.print(
+            f"{escape(loaded.name)}: {n} drones, load of {weight:.4g} N, hover {wind}".rstrip()
+        )
         out.print(
             f"Within the limits the cables hold {found.lightest:.4g} to {found.heaviest:.4g} N: "
             f"{found.margin:.2f} times the load."
         )
+        for each in found.binding:
+            out.print(f"  binding: {escape(str(each))}", highlight=False)
+        spare = found.thrust_limits / found.thrusts
+        i = int(np.argmin(spare))
+        if math.isfinite(spare[i]):
+            out.print(
+                f"In the allocator's formation drone {i} needs {found.thrusts[i]:.4g} N of thrust, the most "
+                f"for what it has: {found.thrust_limits[i]:.4g} N."
+            )
+        else:
+            out.print("Nothing limits the drones' thrust (actuation, allocation.max_thrust).")
         out.print(
             f"{n} cables within {part.max_cone_deg:g} deg of the vertical can be {widest:.1f} deg apart; "
             f"{part.min_angle_deg:g} deg are asked for, which allows {allowed}."
         )
-        for conflict in found.conflicts:
-            out.print(f"[red]conflict[/red]: {escape(conflict)}")
-        out.print("feasible" if found.ok else "not feasible")
-    if not found.ok:
+        show_warnings(warnings)
+        for conflict in conflicts:
+            out.print(f"[red]conflict[/red]: {escape(conflict)}", highlight=False)
+        out.print("not feasible" if conflicts else "feasible")
+    if conflicts:
         raise typer.Exit(EXIT_ERROR)

@@ -18,6 +18,7 @@ from colift.cli.base import (
     loading,
     new_folder,
     out,
+    show_warnings,
     write_results,
 )
 
@@ -59,11 +60,14 @@ def fly(
     with loading():
         from colift.live.run import fly_live
         from colift.mission import load_mission
+        from colift.mission.warnings import warnings_of
         from colift.part import load_file
 
         for path in extra or []:
             load_file(path)
         loaded = load_mission(mission, parse_overrides(sets))
+
+    show_warnings(warnings_of(loaded))
 
     def write(recording: Recording) -> Path:
         from colift.runner import Run

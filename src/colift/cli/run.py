@@ -24,6 +24,7 @@ from colift.cli.base import (
     out,
     progress,
     show_verdict,
+    show_warnings,
     write_results,
 )
 
@@ -60,6 +61,7 @@ def run(
     with loading():
         import colift
         from colift import metrics
+        from colift.mission.warnings import warnings_of
         from colift.part import load_file
 
         for path in extra or []:
@@ -68,6 +70,8 @@ def run(
         loaded = colift.load_mission(
             mission, {**overrides, **({} if seed is None else {"seed": seed})}
         )
+    warnings = warnings_of(loaded)
+    show_warnings(warnings)
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
     verdict = flown.verdict
@@ -82,6 +86,7 @@ def run(
             {
                 "mission": loaded.name,
                 "verdict": {"level": verdict.level, "reasons": verdict.reasons},
+                "warnings": [str(each) for each in warnings],
                 "outcome": flown.recording.outcome,
                 "summary": verdict.sentence,
                 "metrics": flown.metrics,

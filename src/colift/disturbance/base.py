@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, ClassVar
 
 from colift.jit import f8, i8, matrix, vector, void
 from colift.part import Part
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 SIGNATURE = void(
     i8, i8, f8, matrix, matrix, matrix, matrix, matrix, matrix, vector, vector, vector, vector,
@@ -41,3 +45,12 @@ class DisturbancePart(Part):
     layer: ClassVar[str] = "disturbance"
     makes_wind: ClassVar[bool] = False
     """Whether it adds to the wind."""
+    feels_wind: ClassVar[bool] = False
+    """Whether it turns wind into forces."""
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        if self.makes_wind and not any(part.feels_wind for part in mission.disturbance):
+            yield (
+                "kind",
+                "makes wind, which acts on nothing: there is no disturbance of kind drag that turns it into forces",
+            )

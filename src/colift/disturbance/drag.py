@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -84,6 +84,7 @@ class Drag(DisturbancePart):
     """
 
     kernel = _drag
+    feels_wind: ClassVar[bool] = True
 
     air_density: Annotated[float, Field(ge=0.0, le=10.0)] = 1.225
     """kg/m^3."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,10 @@ from colift.jit import inline, kernel
 from colift.math import quaternion
 from colift.part import Places, Vector, carry_rows
 from colift.team import Team
+from colift.tuning import lag_warnings, shorter
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 FINEST = 0.5e-3
 """The forecast remembers one acceleration for every so many seconds of the delay, s."""
@@ -276,6 +281,14 @@ class Predictor(EstimationPart):
     """How long a drone is carried forward without any new sample, s; then it is left standing, for a detection to see."""
     steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
     """How long a measured rate is integrated without a new attitude, s."""
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        delays = mission.sensing.delays()
+        for sensor in ("load", "tracking"):
+            yield from shorter("delay", self.delay, f"sensing.{sensor}_delay", delays[sensor])
+        real = delays["attitude"]
+        yield from shorter("attitude_delay", self.attitude_delay, "sensing.attitude_delay", real)
+        yield from lag_warnings(self.lag, mission)
 
     def params(self, team: Team) -> Vector:
         patience = self.patience if self.load_from == "sensor" else -1.0

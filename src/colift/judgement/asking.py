@@ -261,7 +261,7 @@ def judge(
         Answers(ACTUAL, {}, time, force, arrays["tensions"], arrays["directions"]),
     ]
     for k, (kind, part) in enumerate(parts_for(recording.n, kinds, settings).items()):
-        if conflicts := part.check(team):
+        if conflicts := part.check(team) + part.conflicts(team):
             raise ColiftError(
                 f"{name}: {kind}: " + "; ".join(f"{f} {text}" for f, text in conflicts)
             )

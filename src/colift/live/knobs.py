@@ -86,8 +86,9 @@ def conflicts(flight: Flight, name: str, value: Any) -> list[tuple[str, str]]:
     if name == "load.mass":
         return []
     section, _, field = name.rpartition(".")
-    part = flight.parts[section]
-    return type(part).model_validate({**part.model_dump(), field: value}).check(flight.mission.team)
+    part, team = flight.parts[section], flight.mission.team
+    changed = type(part).model_validate({**part.model_dump(), field: value})
+    return changed.check(team) + changed.conflicts(team)
 
 
 def allocators(team: Team) -> list[str]:
@@ -95,7 +96,7 @@ def allocators(team: Team) -> list[str]:
     found = []
     for name in names("allocation"):
         part = find("allocation", name)
-        if not part.missing() and not part().check(team):
+        if not part.missing() and not [*(made := part()).check(team), *made.conflicts(team)]:
             found.append(name)
     return found
 

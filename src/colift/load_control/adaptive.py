@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
@@ -13,6 +14,9 @@ from colift.load_control.base import SIGNATURE, LoadControlPart
 from colift.part import Vector
 from colift.team import Team
 from colift.tuning import LEAN, Delays
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 # memory: learned over told mass, less 1 (so that zero is the start); force against a steady horizontal one (2)
 
@@ -71,6 +75,9 @@ class Adaptive(LoadControlPart, Delays):
     """Largest mass that is believed, over the one told."""
     max_lean_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 30.0
     """Most lean of the wanted force from the vertical, degrees."""
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        yield from self.delay_warnings(mission, "load_control")
 
     def params(self, team: Team) -> Vector:
         band = self.bandwidths()

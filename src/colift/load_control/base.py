@@ -23,3 +23,5 @@ class LoadControlPart(Part):
     """Base of all load controllers."""
 
     layer: ClassVar[str] = "load_control"
+    senses: ClassVar[tuple[str, ...]] = ("load",)
+    """The sensors (:data:`colift.sensing.base.SENSORS`) whose delay it suffers."""

@@ -6,8 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
+from colift.actuation.base import ActuationPart
+from colift.allocation._hover import hover_conflicts
 from colift.allocation.base import AllocatorPart
 from colift.errors import Problem, UnknownNameError
 from colift.fault.base import FaultPart
@@ -28,9 +31,17 @@ def recorded_bytes(n: int, timing: Timing) -> float:
 
 
 def cross_checks(
-    frame: Frame, parts: Mapping[str, Part], lists: Mapping[str, list[Part]], broken: set[str]
+    frame: Frame,
+    parts: Mapping[str, Part],
+    lists: Mapping[str, list[Part]],
+    broken: set[str],
+    *,
+    must_fly: bool = True,
 ) -> Iterable[Problem]:
-    """Mistakes between fields; ``broken`` sections stand at their defaults and are left out."""
+    """Mistakes between fields; ``broken`` sections stand at their defaults and are left out.
+
+    With ``must_fly`` limits that conflict are mistakes too (:meth:`colift.part.Part.conflicts`).
+    """
     broken = set(broken)
     for name, section in frame:
         if isinstance(section, Section):
@@ -61,9 +72,13 @@ def cross_checks(
             if message := part.missing():
                 yield Problem(kind, "", message)
             team = frame.true_team if part.layer == "plant" else frame.team
-            for field, message in part.check(team):
+            found = part.check(team)
+            if must_fly and not found:
+                found = part.conflicts(team)
+            for field, message in found:
                 yield Problem(f"{path}.{field}", "", message)
-        yield from _start_checks(frame, parts, broken)
+        if must_fly:
+            yield from _start_checks(frame, parts, broken)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
             for field, message in part.check_timing(timing.step, timing.duration):
@@ -94,12 +109,40 @@ def _start_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
     if not isinstance(part, AllocatorPart) or "start" in broken or part.missing():
         return
     drones = frame.first_drones()
-    if (given is None or len(given) == frame.drones.count) and not part.check(frame.team):
+    if (given is None or len(given) == frame.drones.count) and not (
+        part.check(frame.team) or part.conflicts(frame.team)
+    ):
         message = part.of(drones).cannot_start(frame.team.of(drones), frame.start_directions())
         if message:
             field = "cone_deg" if given is None else "directions"
             value = f"{frame.start.cone_deg:g}" if given is None else ""
             yield Problem(f"start.{field}", value, message)
+
+
+def hover_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
+    """Why the team cannot hold the load in hover, in the formation that its allocator settles in.
+
+    Judged by what the controllers are told. Asked only of a valid mission: it calls the allocator, where
+    it has limits that may not do or where motors limit the thrust.
+    """
+    actuation, allocation = parts["actuation"], parts["allocation"]
+    assert isinstance(actuation, ActuationPart)
+    assert isinstance(allocation, AllocatorPart)
+    drones = frame.first_drones()
+    team = frame.team.of(drones)
+    actuation, allocation = actuation.of(drones), allocation.of(drones)
+    directions, thrusts = frame.start_directions(), actuation.thrust_limits(team)
+    unlimited = bool(np.isinf(thrusts).all())
+    if team.gravity == 0.0 or (unlimited and not allocation.cannot_hold(team, thrusts, directions)):
+        return
+    hover = allocation.hover(team, directions, frame.timing.allocation)
+    for layer, message in hover_conflicts(team, hover, thrusts).items():
+        if layer == "actuation":
+            field = actuation.thrust_setting
+            yield Problem(f"actuation.{field}", shown(getattr(actuation, field)), message)
+        else:
+            limits = ", ".join(allocation.binding(team, actuation))
+            yield Problem("allocation", "", f"{message}; what limits: {limits}")
 
 
 def _criteria_checks(frame: Frame) -> Iterable[Problem]:

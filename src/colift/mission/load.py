@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from colift.catalogue import DEFAULT_KINDS, FOLDERS, LAYERS, LISTS, read_source
 from colift.errors import MissionError, Problem, SettingError, UnknownNameError
-from colift.mission.checks import cross_checks
+from colift.mission.checks import cross_checks, hover_checks
 from colift.mission.mission import Mission
 from colift.mission.schema import Frame
 from colift.part import KIND, Part, find, names
@@ -22,7 +22,10 @@ from colift.wording import parse, problems_of, shown
 
 
 def load_mission(
-    source: str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None = None
+    source: str | Path | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    must_fly: bool = True,
 ) -> Mission:
     """Load and validate a mission completely.
 
@@ -35,6 +38,8 @@ def load_mission(
         ``{"allocation": {"kind": "sqp"}}``. They replace those of the source one after the other, so that
         the later one wins; another ``kind`` drops the settings of the part that stood there before, but none
         that was given by its own path.
+    must_fly
+        Whether a mission whose team cannot hold its load, or keep its limits, is refused as well.
 
     Raises
     ------
@@ -57,7 +62,7 @@ def load_mission(
         problem = _override(table, path, value, given)
         if problem:
             problems.append(problem)
-    mission = _validate(table, problems)
+    mission = _validate(table, problems, must_fly)
     if problems or mission is None:
         raise MissionError(label, problems)
     return mission
@@ -136,7 +141,7 @@ def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
     return dict(json.loads(plain.encode("utf-8", "replace")))
 
 
-def _validate(table: dict[str, Any], problems: list[Problem]) -> Mission | None:
+def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) -> Mission | None:
     """Validate section by section, so that a mistake in one does not hide those in others."""
     parts: dict[str, Part] = {}
     kinds: dict[str, str] = {}
@@ -164,7 +169,9 @@ def _validate(table: dict[str, Any], problems: list[Problem]) -> Mission | None:
         broken = {problem.path.partition(".")[0] for problem in mistakes}
         intact = {key: value for key, value in rest.items() if key not in broken}
         frame = parse(Frame, {"name": "?", **intact})
-    problems.extend(cross_checks(frame, parts, lists, broken))
+    problems.extend(cross_checks(frame, parts, lists, broken, must_fly=must_fly))
+    if must_fly and not problems:
+        problems.extend(hover_checks(frame, parts))
     if problems:
         return None
     return Mission.model_validate(

@@ -47,3 +47,5 @@ class PositionControlPart(Part):
     """Base of all position controllers."""
 
     layer: ClassVar[str] = "position_control"
+    senses: ClassVar[tuple[str, ...]] = ("tracking",)
+    """The sensors (:data:`colift.sensing.base.SENSORS`) whose delay it suffers."""

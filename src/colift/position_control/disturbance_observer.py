@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +18,9 @@ from colift.position_control._aim import aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
 from colift.tuning import Delays
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 # params: g; velocity and position bandwidth; observer bandwidth, its bound over weight; lag of the motors; frequency
 # of the cables; time constant of the thrust's rate; least and most thrust over weight, tangent of the tilt; most
@@ -188,6 +192,9 @@ class DisturbanceObserver(PositionControlPart, Delays):
     """Most thrust over the drone's weight."""
     max_tilt_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 45.0
     """Most tilt, degrees."""
+
+    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+        yield from self.delay_warnings(mission, "position_control")
 
     def params(self, team: Team) -> Vector:
         band = self.bandwidths()

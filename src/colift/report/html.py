@@ -133,6 +133,12 @@ def facts(values: Iterable[str]) -> str:
     return '<ul class="facts">' + "".join(f"<li>{escape(v)}</li>" for v in values) + "</ul>"
 
 
+def warnings_list(warnings: Sequence[str]) -> str:
+    """What was warned of before the flight; nothing where nothing was."""
+    items = "".join(f"<li>{escape(text)}</li>" for text in warnings)
+    return f'<p class="soft">Warned before the flight:</p>\n<ul>{items}</ul>' if items else ""
+
+
 def figure(drawing: Drawing) -> str:
     """A figure on a card with its caption."""
     return (
@@ -220,6 +226,7 @@ def report(
                 f"colift {recording.versions.get('colift', '?')}",
             ]
         ),
+        warnings_list(recording.provenance.get("warnings", [])),
         criteria_table(verdict.judged),
         moments_table(recording.moments),
         "<h2>Numbers</h2>",

@@ -29,7 +29,15 @@ measured_*  as above    in/out: what the controllers are told; on entry, what th
 """
 
 
+SENSORS = ("load", "tracking", "attitude", "rates")
+"""What is measured: the load, and of each drone its position and velocity, its attitude, its body rates."""
+
+
 class SensingPart(Part):
     """Base of all sensor models."""
 
     layer: ClassVar[str] = "sensing"
+
+    def delays(self) -> dict[str, float]:
+        """Age of what is measured when it arrives, s: of ``load``, ``tracking``, ``attitude`` and ``rates``."""
+        return dict.fromkeys(SENSORS, 0.0)

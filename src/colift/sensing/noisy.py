@@ -255,6 +255,9 @@ class Noisy(SensingPart):
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         return carry_rows(old, fresh, *self._sizes(), places)
 
+    def delays(self) -> dict[str, float]:
+        return {name: float(getattr(self, f"{name}_delay")) for name in _SENSORS}
+
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
         periods = {f"{name}_period": getattr(self, f"{name}_period") for name in _SENSORS}
         delays = {f"{name}_delay": getattr(self, f"{name}_delay") for name in _SENSORS}

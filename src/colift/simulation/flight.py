@@ -7,12 +7,14 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import takewhile
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.actuation.base import ActuationPart
 from colift.allocation.base import INFO_SIZE, AllocatorPart
 from colift.disturbance.base import DisturbancePart
 from colift.errors import ColiftError, Problem, SettingError
@@ -21,6 +23,7 @@ from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.interrupts import heard
 from colift.mission.mission import Mission
 from colift.mission.schema import Event
+from colift.mission.warnings import warnings_of
 from colift.part import LAYERS, Part, Vector, make
 from colift.plant.base import Start
 from colift.recording import Recording
@@ -97,6 +100,11 @@ class Flight:
     def time(self) -> float:
         """Simulated time flown, s."""
         return self._step * self._every.step
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What the mission's parts warned of before the flight (:mod:`colift.mission.warnings`)."""
+        return [str(warning) for warning in warnings_of(self.mission)]
 
     @property
     def compiled(self) -> bool:
@@ -272,6 +280,7 @@ class Flight:
             cycle_time=np.arange(first_cycle, first_cycle + len(allocations), dtype=np.float64)
             * (every.allocation * every.step),
             arrays=arrays,
+            provenance={"warnings": self.warnings} if self.warnings else {},
             outcome=(self.descent or self.outcome) if self.outcome == "completed" else self.outcome,
         )
 
@@ -323,13 +332,14 @@ class Flight:
 
     def _cannot_carry(self, drones: list[int]) -> str:
         """Why these drones cannot carry the load on; empty when they can, as far as their models say."""
-        team = self.mission.team.of(drones)
-        actuation, allocation = (
-            self._parts[layer].of(drones) for layer in ("actuation", "allocation")
-        )
-        problems = [message for _, message in actuation.check(team)]
-        if isinstance(allocation, AllocatorPart):
-            problems += allocation.cannot_hold(team)
+        bus, team = self.bus, self.mission.team.of(drones)
+        actuation = self._parts["actuation"].of(drones)
+        allocation = self._parts["allocation"].of(drones)
+        assert isinstance(actuation, ActuationPart)
+        assert isinstance(allocation, AllocatorPart)
+        directions = bus.desired_directions[[self.drones.index(drone) for drone in drones]]
+        problems = [message for _, message in actuation.conflicts(team)]
+        problems += allocation.cannot_hold(team, actuation.thrust_limits(team), directions)
         return "; ".join(problems)
 
     def _advance(self, stop: int) -> None:

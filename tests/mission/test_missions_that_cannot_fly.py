@@ -1,0 +1,115 @@
+"""Missions whose team cannot hold its load are refused before they fly, with the reason and the numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from colift.errors import MissionError
+from colift.mission import load_mission
+from colift.simulation.flight import Flight
+
+WEAK = {
+    "name": "weak-motors",
+    "load": {"mass": 1.0},
+    "drones": {"count": 4, "mass": 0.5, "cable_length": 1.0},
+    "timing": {"duration": 6.0, "load_control": 0.01, "allocation": 0.01},
+    "reference": {"kind": "hover", "position": [0.0, 0.0, 2.0]},
+    "allocation": {"kind": "safe", "min_angle_deg": 30.0, "mu_scaling": "weight", "max_rate": 0.5},
+    "position_control": {
+        "kind": "feed-forward", "k_p": [5.0] * 3, "k_d": [3.0] * 3, "k_i": [1.5] * 3,
+        "frequency": 3.0, "thrust_filter": 0.1,
+    },
+    "attitude_control": {
+        "kind": "manifold", "rho": [24.0] * 3, "k_d": [0.8, 0.72, 1.44], "beta": [0.01] * 3,
+    },
+    "actuation": {"kind": "motors", "max_thrust": 1.87},
+}  # fmt: skip
+"""The four drones lift a little more than everything weighs, were the cables vertical."""
+
+
+@pytest.mark.parametrize("thrust", [1.84, 1.87, 1.885])
+def test_motors_just_too_weak_are_refused_with_needed_and_given_thrust(thrust):
+    with pytest.raises(MissionError) as refused:
+        load_mission(WEAK, {"actuation.max_thrust": thrust})
+    (problem,) = refused.value.problems
+    assert problem.path == "actuation.max_thrust"
+    assert problem.value == f"{thrust:g}"
+    assert "needs 7.547 N" in problem.message
+    assert f"motors give {4 * thrust:.4g} N" in problem.message
+    assert "34.5 degrees from the vertical" in problem.message
+
+
+def test_the_border_is_where_hover_in_the_formation_flown_needs_all_of_the_thrust():
+    flight = Flight(load_mission(WEAK, {"actuation.max_thrust": 2.2}))
+    r = flight.run()
+    tilt = np.arccos(-r["desired_directions"][-1, :, 2])
+    tension = 9.81 / 4.0 / np.cos(tilt)
+    needed = np.hypot(0.5 * 9.81 + tension * np.cos(tilt), tension * np.sin(tilt)).max()
+    border = needed / 4.0
+    load_mission(WEAK, {"actuation.max_thrust": 1.003 * border})
+    with pytest.raises(MissionError, match="too weak"):
+        load_mission(WEAK, {"actuation.max_thrust": 0.997 * border})
+
+
+def test_what_is_refused_would_sink_and_what_is_not_holds():
+    weak = load_mission(WEAK, {"actuation.max_thrust": 1.87}, must_fly=False)
+    assert Flight(weak).run()["load"][-1, 0, 2] < 1.0
+    strong = Flight(load_mission(WEAK, {"actuation.max_thrust": 1.95, "timing.duration": 12.0}))
+    assert strong.run()["load"][-1, 0, 2] == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize("kind", ["ring", "min-norm"])
+def test_motors_are_judged_with_any_allocator(kind):
+    with pytest.raises(MissionError, match=r"motors are too weak.*35 degrees"):
+        load_mission(WEAK, {"allocation.kind": kind})
+
+
+def test_a_load_beyond_the_cables_names_what_binds():
+    heavy = {"load.mass": 1.95}  # together the cables may pull 20 N, the load weighs 19.1 N
+    with pytest.raises(MissionError, match=r"tension_max = 5 N \(the default\), .*min_angle_deg"):
+        load_mission("hover", heavy)
+    load_mission("hover", {"load.mass": 1.88})
+    assert load_mission("hover", heavy, must_fly=False).load.mass == 1.95
+
+
+def colift(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "colift", *arguments],
+        capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+
+
+def test_the_commands_refuse_and_judge(tmp_path):
+    tomli_w = pytest.importorskip("tomli_w")
+    file = tmp_path / "weak.toml"
+    file.write_text(tomli_w.dumps(WEAK))
+    flown = colift("run", str(file), "--out", str(tmp_path / "out"))
+    assert flown.returncode == 2  # as for any mistake in a mission
+    assert "motors are too weak" in flown.stderr
+    assert not (tmp_path / "out").exists()
+    judged = colift("feasibility", str(file), "--json")
+    assert judged.returncode == 1
+    found = json.loads(judged.stdout)
+    assert found["feasible"] is False
+    assert "motors are too weak" in found["conflicts"][0]
+    assert found["thrusts_N"] == pytest.approx([7.547] * 4, abs=0.002)
+    assert found["thrust_limits_N"] == [7.48] * 4
+    assert found["binding"][0]["path"] == "actuation.max_thrust"
+    assert found["binding"][0]["default"] is False
+    # The best formation, 30 degrees apart, would hold it by two hundredths.
+    cone = math.asin(math.sin(math.radians(15.0)) / math.sin(math.pi / 4.0))
+    own = 0.5 * 9.81
+    pull = math.sqrt(7.48**2 - (own * math.sin(cone)) ** 2) - own * math.cos(cone)
+    assert found["heaviest_N"] == pytest.approx(4.0 * pull * math.cos(cone), rel=3e-3)
+
+
+def test_wind_is_said_to_be_left_out():
+    shown = colift("feasibility", "windy-spiral")
+    assert shown.returncode == 0
+    assert "disturbance.0 (wind)" in " ".join(shown.stdout.split())
