@@ -6,6 +6,8 @@ imports what it needs inside it. The file is imported when its command is called
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 from typing import Annotated, NoReturn
 
@@ -34,6 +36,12 @@ def _options(
 
 def main() -> None:
     """Entry point: errors of ours become one clear message and an exit code."""
+    gc.set_threshold(
+        100_000, 20, 100
+    )  # what is imported stays: looking through it again and again takes a tenth
+    os.environ.setdefault(
+        "PYDANTIC_DISABLE_PLUGINS", "1"
+    )  # it would look through all packages for one
     try:
         app()
     except (MissionError, UnknownNameError) as error:
