@@ -20,15 +20,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
 from typing import Any, TypeVar, cast
 
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, event
+from numba.core import caching, cgutils, event
+from numba.core.runtime.nrt import rtsys
 from numba.extending import intrinsic, overload
 
 config: Any = numba.config
@@ -52,12 +51,11 @@ def kernel(signature: Any) -> Callable[[F], F]:
     """Compile a kernel for one explicit signature, cached on disk; called from Python, it lets other threads run."""
 
     def decorate(function: F) -> F:
-        with _without_scipy(), _cache_for(function):
-            compiled: Any = numba.njit(
-                cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH
-            )(function)
-            if JIT_ENABLED:
-                _compile(compiled, signature)
+        compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=_FASTMATH)(function)
+        if JIT_ENABLED:
+            with _cache_for(function):
+                compiled._cache = _Cache(function)
+            _compile(compiled, signature)
         made.append(name_of(function))
         return cast(F, compiled)
 
@@ -115,22 +113,13 @@ def inline(function: F) -> F:
 _one_at_a_time = threading.RLock()  # for Numba's setting, which is the whole process's
 
 
-@contextmanager
-def _without_scipy() -> Iterator[None]:
-    """Spare Numba the import of SciPy (a sixth of a second), by which it learns once that there is linear algebra.
+class _Cache(caching.FunctionCache):
+    """Numba's cache, but what was compiled is loaded without all that only compiling needs: a fifth of a second."""
 
-    No kernel of ours calls any. The mark is taken away at once: a user's kernel that does finds SciPy.
-    """
-    mark = "scipy.linalg.cython_blas"
-    known = "numba.np.arraymath" in sys.modules or mark in sys.modules
-    if known or threading.active_count() > 1 or find_spec("scipy") is None:
-        yield
-        return
-    sys.modules[mark] = ModuleType(mark)
-    try:
-        yield
-    finally:
-        del sys.modules[mark]
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        rtsys.initialize(target_context)  # of the refresh that is left out, what running code needs
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 @contextmanager
