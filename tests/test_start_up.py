@@ -35,7 +35,7 @@ def modules_after(*arguments: str) -> set[str]:
         "print('\\n@' + ' '.join(sys.modules))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script], text=True, capture_output=True, check=True, timeout=300
+        [sys.executable, "-c", script], text=True, capture_output=True, check=True, timeout=900
     )
     return set(done.stdout.rpartition("@")[2].split())
 
@@ -61,6 +61,7 @@ def test_a_command_imports_itself_alone():
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
+    modules_after("compile", "paper-spiral", "--json")
     folder = tmp_path_factory.mktemp("flight") / "out"
     return modules_after(
         "run", "--no-report", "--json", "--set", "timing.duration=0.1", "--out", str(folder)
