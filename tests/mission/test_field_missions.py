@@ -1,0 +1,81 @@
+"""Missions after public reports of people who fly slung loads: what is said of each of them must be true."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import colift
+from colift.errors import MissionError
+from colift.mission import load_mission
+
+FIELD = Path(__file__).parent / "field"
+WEAK = FIELD / "s05_weak_motors.toml"
+
+
+def fly(name, **changes):
+    return colift.run(FIELD / f"{name}.toml", overrides=changes)
+
+
+def test_every_mission_of_the_folder_is_judged_here():
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert all(path.stem in text for path in FIELD.glob("*.toml"))
+
+
+@pytest.mark.parametrize("name", ["s03_two_drones", "s03b_one_drone"])
+def test_an_offset_that_grows_to_metres_is_no_pass(name):
+    verdict = fly(name).verdict
+    assert verdict.level in {"fail", "lost"}
+    assert any("tracking_max_m" in reason for reason in verdict.reasons)
+
+
+def test_a_load_let_go_is_lost():
+    """Released at 7 s; it falls until 12 s, with nothing there yet to stop it."""
+    run = fly("s01b_land_release")
+    assert run.verdict.level == "lost"
+    assert "no cable holds the load at the end" in run.verdict.reasons
+    assert any("underground" in reason for reason in run.verdict.reasons)
+
+
+def test_a_load_that_sinks_below_the_ground_is_no_pass():
+    run = fly("s01_takeoff_ground")
+    assert run.metrics["min_height_m"] < 0.0
+    assert run.verdict.level in {"fail", "lost"}
+
+
+def test_drones_with_the_gains_of_others_are_told_lost():
+    run = fly("s08_crazyflie_naive")
+    assert run.verdict.level == "lost"
+    assert run.verdict.reasons[0].startswith("diverged before t = ")
+
+
+@pytest.mark.parametrize("thrust", [1.84, 1.87, 1.95])
+def test_motors_too_weak_are_refused_before_the_flight(thrust):
+    with pytest.raises(MissionError) as caught:
+        load_mission(WEAK, {"actuation.max_thrust": thrust})
+    found = [each for each in caught.value.problems if each.path.startswith("actuation.")]
+    assert found, caught.value
+    assert "max_thrust" in str(found[0])
+
+
+def test_motors_strong_enough_are_not_refused():
+    assert load_mission(WEAK, {"actuation.max_thrust": 3.0}).actuation.max_thrust == 3.0
+
+
+def test_a_heavy_rope_is_hovered_with_without_a_lasting_error():
+    """Nobody is told what the rope weighs; it sways, but on the mean of the last 10 s it is where it should be."""
+    run = fly("s02_heavy_rope")
+    error = run.recording["load"][:, 0] - run.recording["reference"][:, 0]
+    assert run.verdict.ok
+    assert np.abs(error[run.recording.time > 20.0].mean(axis=0)).max() < 0.01
+
+
+@pytest.mark.parametrize("plant", ["slack-cables", "elastic-cables", "bead-cables"])
+def test_a_snap_has_the_same_impulse_on_every_plant(plant):
+    found = {
+        kind: fly("s07_snap", **{"plant.kind": kind}).metrics["max_catch_impulse_Ns"]
+        for kind in ("slack-cables", plant)
+    }
+    assert found[plant] == pytest.approx(found["slack-cables"], rel=0.1)
