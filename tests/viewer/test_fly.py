@@ -101,8 +101,8 @@ def test_a_person_flies(flying: Flying, open_url: Open) -> None:
 
     # A cut cable: its drone has gone from the page too, and the others spread anew.
     opened.click("Cut cable 2")
-    flying.wait(opened, lambda s: s.flight.drones == [0, 2, 3])
-    opened.wait("!Number.isFinite(colift.state().flights[0].tensions[1])")
+    flying.wait(opened, lambda s: s.flight.drones == [0, 1, 3])
+    opened.wait("!Number.isFinite(colift.state().flights[0].tensions[2])")
 
     def spread(session: Session) -> bool:
         return bool(np.ptp(pairwise_angles(session.flight.bus.directions)) < np.radians(10.0))

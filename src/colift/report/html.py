@@ -76,7 +76,8 @@ pre{overflow-x:auto;margin:.7rem 0 .2rem}
 font-size:.8rem}
 .legend svg:not(.icon){width:1.6rem;height:.7rem;margin-right:.35rem;fill:none;
 stroke-width:2.2}
-@media (max-width:40rem){figure svg[role=img]:not(.icon){min-width:0}figure .scroll{padding:.3rem}
+@media (max-width:40rem){figure svg[role=img]:not(.icon){min-width:0;overflow:visible}
+figure .scroll{padding:.3rem .6rem .3rem .8rem}
 figure svg text{font-size:13px!important}figure svg[aria-label="Path"] text{font-size:11px!important}
 figure svg [id*="-ylabel_"]{transform:translateX(-9px)}figure svg [id*="-legend_"]{display:none}
 .legend{display:flex}
