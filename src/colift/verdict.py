@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from colift.mission.mission import Mission
     from colift.mission.recorded import RecordedMission
 
-    AnyMission = Mission | RealFlight | RecordedMission
+    AnyMission: TypeAlias = Mission | RealFlight | RecordedMission
 
 Level = Literal["pass", "warn", "fail", "lost"]
 
