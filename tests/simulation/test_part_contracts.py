@@ -33,6 +33,8 @@ needs_jit = pytest.mark.skipif(not jit.JIT_ENABLED, reason="compiled kernels onl
 
 def mission_with(layer, name, **overrides):
     table = {"name": "test", "reference": {"kind": "spiral"}, "timing": {"duration": 1.2}}
+    if name == "motor-degraded":
+        table["actuation"] = {"kind": "motors"}
     table[layer] = [{"kind": name}] if layer in part.LISTS else {"kind": name}
     return load_mission(table, overrides)
 
@@ -157,6 +159,8 @@ class TestEveryFault:
     def test_does_not_stop_the_flight(self, name):
         table = {"name": "test", "reference": {"kind": "hover"}, "timing": {"duration": 0.4}}
         table["fault"] = [{"kind": name, "at": 0.2, "drone": 1}]
+        if name == "motor-degraded":
+            table["actuation"] = {"kind": "motors"}
         recording = Flight(load_mission(table)).run()
         assert recording.outcome == "completed"
         assert len(recording.time) == 81
