@@ -173,9 +173,9 @@ def test_so_does_every_command(tmp_path):
             [sys.executable, "-m", "colift", *words], capture_output=True, text=True, check=False
         )
         assert json.loads(done.stdout), name
-    assert 'kind = "motors"' in (tmp_path / "mission.toml").read_text()
+    assert 'kind = "motors"' in (tmp_path / "run" / "mission.toml").read_text()
     from colift.campaign.store import Store
 
-    with Store(tmp_path / "campaign.sqlite") as store:
+    with Store(tmp_path / "stress" / "campaign.sqlite") as store:
         ((mission,),) = store._db.execute("SELECT mission FROM runs").fetchall()
     assert json.loads(mission)["actuation"]["kind"] == "motors"

@@ -6,7 +6,6 @@ import pytest
 
 import colift
 
-
 RISES = pytest.mark.xfail(reason="5.5 cm since rotors drag")
 
 
