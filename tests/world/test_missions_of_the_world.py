@@ -6,7 +6,7 @@ import pytest
 
 import colift
 
-RISES = pytest.mark.xfail(reason="5.5 cm since rotors drag")
+RISES = pytest.mark.xfail(reason="5.5 cm; the cause is not established")
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ def test_spirals_are_flown_in_the_world(name, error):
     assert metrics["lost_drones"] == 0.0
 
 
-@pytest.mark.xfail(reason="24 cm since rotors drag; 5 cm before")
+@pytest.mark.xfail(reason="24 cm; the cause is not established")
 def test_an_unannounced_cut_is_found_and_flown_on():
     run = colift.run("cut-in-flight")
     assert run.recording.outcome == "completed"
