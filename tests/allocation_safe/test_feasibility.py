@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from time import process_time
 
 import numpy as np
 import pytest
 
 from colift.actuation.motors import Motors
 from colift.allocation._feasibility import (
+    POLISHED,
+    QUICK,
     feasibility,
     formations,
     limits_of,
@@ -166,9 +167,11 @@ def test_tensions_along_given_cables_are_those_of_a_linear_programme():
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 9, 30, 200])
-def test_the_question_in_flight_is_bounded_and_agrees_with_the_search(n):
+def test_the_question_in_flight_is_bounded_and_agrees_with_the_search(n, monkeypatch):
     settings = Safe(min_angle_deg=min(30.0, 100.0 / math.sqrt(n)))
     motors = np.full(n, 9.0)
+    solve, solved = np.linalg.solve, []
+    monkeypatch.setattr(np.linalg, "solve", lambda A, b: solved.append(len(b)) or solve(A, b))
     limits = limits_of(Team.uniform(n), settings, motors)
     now = (
         widest_formation(n, limits.cone, enough=1.05 * limits.min_angle)[0]
@@ -178,13 +181,10 @@ def test_the_question_in_flight_is_bounded_and_agrees_with_the_search(n):
     best = extreme(limits, formations(n, limits)).weight if n <= 9 else 0.85 * limits.bound()
     for share, holds in ((0.5, True), (0.96 if n <= 9 else 0.9, True), (1.0 / 0.85, False)):
         team = Team.uniform(n, load_mass=share * best / 9.81)
-        times = []
-        for _ in range(5):
-            begin = process_time()
-            found = settings.cannot_hold(team, motors, now)
-            times.append(process_time() - begin)
+        solved.clear()
+        found = settings.cannot_hold(team, motors, now)
         assert (found == []) is holds, (share, found)
-        assert min(times) < 0.02
+        assert len(solved) <= (QUICK if n <= POLISHED else 2 * 25 * 7)
     if not holds:
         assert "tension_max" in found[0]
         assert f"{team.load_mass * 9.81:.4g} N" in found[0]

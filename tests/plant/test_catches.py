@@ -164,7 +164,7 @@ def test_plants_agree_on_drop_and_catch():
         {"load.mass": 0.5},
         {"drones.mass": 1.0},
         {"drones.count": 2},
-        pytest.param({"drones.count": 3}, marks=pytest.mark.xfail(reason="7.7 % apart")),
+        {"drones.count": 3},
     ],
     ids=str,
 )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from time import process_time
-
 import numpy as np
 import pytest
 
@@ -358,8 +356,6 @@ def test_nobody_calls_the_allocator_to_ask_who_can_carry(monkeypatch):
         raise AssertionError("the allocator was called")
 
     monkeypatch.setattr(Allocator, "allocate", never)
-    begin = process_time()
     assert "tension_max" in flight._cannot_carry([0, 1])
-    assert process_time() - begin < 0.05
     flight.lose([2])
     assert flight.descent
