@@ -89,15 +89,41 @@ def test_a_weak_motor_needs_motors():
         load_mission("hover", {"fault": [{"kind": kind, "at": 0.1}]})
 
 
-@pytest.mark.xfail(reason="it turns at 0.5 rad/s only; the cause is not established")
 def test_a_dead_motor_turns_its_drone():
-    changes = {"actuation.kind": "motors", "fault.0.at": 0.5, "timing.duration": 1.0}
+    """It is kicked with what the others give too much, and goes on turning: nothing can turn it back.
+
+    The mixer stops the motor opposite within 0.1 s, which takes the torque away; only the dead motor could give
+    one the other way. Two motors are left, at half their most, for the mixer wants the dead one at its most. They
+    spin the same way. Until then the torque falls about evenly: the drone gains 0.5 rad/s on either axis.
+    """
+    changes = {"actuation.kind": "motors", "fault.0.at": 0.5, "timing.duration": 0.7}
     fault = [{"kind": "motor-degraded", "drone": 2, "motor": 0, "health": 0.0}]
+    changes["detection.kind"] = "none"
     r = colift.run(mission("ideal").resolved(), overrides={"fault": fault, **changes}).recording
-    rates = np.abs(r["rates"][:, :, :2])
-    before, after = np.nanmax(rates[r.time < 0.5]), np.nanmax(rates[r.time > 0.5], axis=(0, 2))
-    assert after[2] > 10.0 * max(before, 0.05)
-    assert after[2] > 3.0 * np.delete(after, 2).max()
+    drones, motors = r.mission.drones, r.mission.actuation
+    before, after, late = r.time < 0.5, (r.time >= 0.5) & (r.time < 0.51), r.time >= 0.65
+    lever = motors.arm_length / np.sqrt(2.0)
+    kick = lever * 0.25 * r["thrusts"][after, 2].mean()
+    np.testing.assert_allclose(
+        r["applied_torques"][after, 2, :2].mean(axis=0), [-kick, kick], rtol=0.06
+    )
+    assert np.abs(r["applied_torques"][late, 2, :2]).max() < 0.05 * kick
+    both = 2.0 * motors.max_thrust / 2.0
+    np.testing.assert_allclose(r["applied_thrusts"][late, 2], both, rtol=0.05)
+    assert both < 0.65 * drones.mass * 9.81
+    np.testing.assert_allclose(
+        r["applied_torques"][late, 2, 2], -motors.torque_ratio * both, rtol=0.05
+    )
+    rates = r["rates"][:, 2]
+    gained = rates[late] - rates[before][-1]
+    evenly = 0.5 * kick * 0.1 / np.array(drones.inertia[:2])
+    np.testing.assert_allclose(gained[:, :2].mean(axis=0), [-evenly[0], evenly[1]], rtol=0.2)
+    spin = np.gradient(rates[late, 2], r.time[late])
+    np.testing.assert_allclose(spin, -motors.torque_ratio * both / drones.inertia[2], rtol=0.1)
+    tilting = np.linalg.norm(r["rates"][:, :, :2], axis=2)
+    assert tilting[late, 2].min() > 3.0 * tilting[before].max()
+    assert (r["saturated_times"][-1, [0, 1, 3]] == 0.0).all()
+    assert r["saturated_times"][-1, 2] > 0.1
 
 
 def test_two_weak_motors_of_one_drone_keep_both_faults():
@@ -224,7 +250,6 @@ def test_stuck_sensors_of_the_load_are_nobodys_loss():
     assert r.outcome == "completed"
 
 
-@pytest.mark.xfail(reason="healthy drones are judged lost after the stuck one")
 def test_a_drone_whose_sensors_stay_stuck_is_dropped():
     for frozen in (0.0, 0.06):
         fault = {"kind": "sensor-stuck", "duration": 5.0}
@@ -254,7 +279,7 @@ def test_thresholds_are_settings():
                                  {"detection.speed": 10.0}))  # fmt: skip
     flight.run()
     assert flight.found == []
-    assert Residuals().params(colift.team.Team.uniform(3)).size == 11
+    assert Residuals().params(colift.team.Team.uniform(3)).size == 13
 
 
 def alarms(distances, dt=0.005):
@@ -288,6 +313,168 @@ def test_a_length_that_nobody_knows_yet_alarms_nobody():
     """A cable 5 % longer than thought, slack at the start."""
     falling = np.minimum(1.0 + 0.5 * 1.3 * (0.005 * np.arange(200)) ** 2, 1.05)
     assert not alarms(falling).any()
+
+
+class Hovering:
+    """Drones held in place under their tilted thrusts by wind, weight and cables; told to the kernel as a flight."""
+
+    DT = 0.005
+
+    def __init__(self, winds, **settings):
+        """``winds``: forces on the drones over their weight, (n, 3)."""
+        self.part, n = Residuals(**settings), len(winds)
+        self.team = colift.team.Team.uniform(n)
+        self.m, self.g = self.team.masses[0], self.team.gravity
+        self.wind = self.m * self.g * np.array(winds, dtype=float)
+        turns = 2.0 * np.pi * np.arange(n) / n
+        cone = 0.0 if n == 1 else np.radians(30.0)
+        self.directions = -np.stack([np.sin(cone) * np.cos(turns), np.sin(cone) * np.sin(turns),
+                                     np.full(n, np.cos(cone))], axis=1)  # fmt: skip
+        self.tensions = np.full(n, 0.7)
+        wanted = -self.wind - self.tensions[:, None] * self.directions
+        wanted[:, 2] += self.m * self.g
+        self.thrusts = np.linalg.norm(wanted, axis=1)
+        x, y, z = (wanted / self.thrusts[:, None]).T
+        quaternions = np.stack([1.0 + z, -y, x, np.zeros(n)], axis=1)
+        self.attitudes = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
+        self.load, self.velocities = np.zeros((2, 3)), np.zeros((n, 3))
+        self.positions = -self.directions
+        self.params, self.memory = self.part.params(self.team), self.part.memory(self.team)
+        self.carrying = np.ones(n)
+
+    def fly(self, duration, forces=None, moving=True):
+        """These forces (n, 3) push them on; the time at which the first is judged lost, and who is."""
+        for step in range(round(duration / self.DT)):
+            if forces is not None:
+                self.velocities += self.DT / self.m * forces
+            if moving:
+                self.positions += self.DT * self.velocities
+            Residuals.kernel(
+                self.DT, self.load, self.positions, self.velocities, self.attitudes, self.thrusts,
+                self.tensions, self.directions, self.params, self.memory, self.carrying,
+            )  # fmt: skip
+            assert np.isfinite(self.memory).all()
+            if not self.carrying.all():
+                return (step + 1) * self.DT, np.flatnonzero(self.carrying == 0.0).tolist()
+        return None
+
+    def without_thrust(self, lost, share=1.0):
+        """The forces that act when these drones lack a share of their thrust, and their cables' tension."""
+        wanted = self.wind + self.tensions[:, None] * self.directions
+        wanted[:, 2] -= self.m * self.g
+        thrust = -wanted
+        forces = np.zeros_like(wanted)
+        for i in lost:
+            forces[i] = -share * thrust[i] - self.tensions[i] * self.directions[i]
+        return forces
+
+
+WINDS = [(0.0, 0.0), (0.7, 0.0), (0.0, -1.2), (0.9, 0.9)]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 8])
+@pytest.mark.parametrize("wind", WINDS)
+def test_wind_as_strong_as_weight_is_no_lack_of_thrust(n, wind):
+    """Rotors that give more drag more: a quarter about the mean. A dead drone is found in the same wind."""
+    shares = np.linspace(0.75, 1.25, n) if n > 1 else np.ones(1)
+    winds = np.column_stack([np.outer(shares, wind), np.zeros(n)])
+    assert Hovering(winds).fly(3.0) is None
+    for lost in range(n):
+        flight = Hovering(winds)
+        assert flight.fly(1.0) is None
+        after, who = flight.fly(0.3, flight.without_thrust([lost]))
+        assert who == [lost]
+        # One that is blown along its cable does not slacken it at once.
+        assert after <= (0.1 if np.hypot(*wind) < 1.0 else 0.2)
+
+
+def test_a_gust_pushes_all_and_nobody_is_lost():
+    """Force of the weight within 0.3 s, which nobody has tilted against yet."""
+    flight = Hovering(np.zeros((4, 3)))
+    assert flight.fly(1.0) is None
+    push = np.tile([flight.m * flight.g, 0.0, 0.0], (4, 1))
+    for share in np.linspace(0.0, 1.0, 60):
+        flight.load[1] = flight.velocities[0]  # which takes the load along
+        flight.load[0] = flight.positions.mean(axis=0) + [0.0, 0.0, flight.directions[0, 2]]
+        assert flight.fly(flight.DT, share * push) is None
+
+
+def test_two_drones_lost_at_once_are_both_found():
+    flight = Hovering(np.tile([0.8, 0.0, 0.0], (4, 1)))
+    assert flight.fly(1.0) is None
+    forces, found = flight.without_thrust([0, 2]), set()
+    for _ in range(20):
+        _, who = flight.fly(flight.DT, forces) or (0.0, [])
+        found |= set(who)
+        flight.carrying[:] = 1.0
+    assert found == {0, 2}
+
+
+def test_a_share_of_thrust_below_the_threshold_is_none():
+    for share, found in ((0.35, False), (0.6, True)):
+        flight = Hovering(np.tile([0.8, 0.0, 0.0], (4, 1)))
+        assert flight.fly(1.0) is None
+        assert bool(flight.fly(0.5, flight.without_thrust([1], share))) == found
+
+
+def test_a_taut_cable_that_pulls_too_much_is_no_lost_drone_at_once():
+    """Its pull cannot be told from thrust that lacks: it holds the drone where thrust and wind would move it."""
+    flight = Hovering(np.zeros((4, 3)))
+    assert flight.fly(1.0) is None
+    flight.thrusts[1] *= 2.5  # against more tension than anybody wanted
+    after, who = flight.fly(1.0)
+    assert who == [1]
+    assert after == pytest.approx(flight.part.tug, abs=0.1)
+
+
+def test_a_drone_that_says_it_moves_and_stands_is_not_measured_any_more():
+    for speed in (0.4, 1.0):
+        flight = Hovering(np.zeros((4, 3)))
+        flight.fly(0.5)
+        flight.velocities[:] = [speed, 0.0, 0.0]
+        flight.load[1, 0] = speed
+        flight.velocities[[0, 1, 3]] *= 1.0 + 1e-9  # the others' numbers change, if little
+        found = None
+        for _ in range(100):
+            flight.velocities[[0, 1, 3], 1] += 1e-12
+            found = flight.fly(flight.DT, moving=False)
+            if found:
+                break
+        assert found[1] == [2]
+        assert speed * flight.memory.reshape(4, -1)[2, 12] == pytest.approx(
+            flight.part.astray, abs=1.1 * speed * flight.DT
+        )
+    # In balance it stands for as long as it likes, and so it may where this is not looked at.
+    assert Hovering(np.zeros((4, 3))).fly(5.0) is None
+    flight = Hovering(np.zeros((4, 3)), astray=0.0)
+    flight.velocities[:, 0] = flight.load[1, 0] = 0.5
+    assert flight.fly(2.0, moving=False) is None
+
+
+def test_the_kernel_stays_finite_at_any_period():
+    """Also where the filter forgets all within a period."""
+    for dt in (1e-4, 0.1, 1.0):
+        flight = Hovering(np.tile([0.5, 0.0, 0.0], (3, 1)), filter=0.002)
+        flight.DT = dt
+        rng = np.random.default_rng(0)
+        for _ in range(50):
+            flight.velocities[:] = rng.normal(size=(3, 3))
+            flight.fly(dt)
+            assert np.isfinite(flight.memory).all()
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_no_false_alarm_in_a_storm(n):
+    """15 m/s with gusts on ``real-world``: the force of the wind nears a drone's weight."""
+    for seed in range(3):
+        storm = {"disturbance.0.speed": 15.0, "disturbance.1.speed": 15.0, "seed": seed}
+        storm |= {"drones.count": n, "truth.load_mass_factor": 1.0}
+        flight = Flight(load_mission("real-world", storm))
+        r = flight.run()
+        assert flight.found == []
+        drones = r.mission.drones
+        force = np.linalg.norm(r["external_forces"][:, :-1], axis=2).max()
+        assert force > 0.6 * drones.mass * 9.81
 
 
 # ---------------------------------------------------------------- controlled descent

@@ -9,20 +9,42 @@ import numpy as np
 from pydantic import Field
 
 from colift.detection.base import SIGNATURE, DetectionPart
-from colift.jit import kernel
+from colift.jit import inline, kernel
 from colift.math import quaternion
 from colift.part import Places, Vector, carry_rows
 from colift.team import Team
 
-# Parameters before the masses: filter, hold, speed, length, time to learn it, deficit, frozen, gravity.
-_HEAD = 8
-_SLOTS = 25
+# Parameters before the masses: filter, hold, speed, length, time to learn it, deficit, frozen, gravity, astray,
+# tug.
+_HEAD = 10
+_SLOTS = 29
 _LENGTH, _DISTANCE, _SPEED, _V, _P, _CABLE, _THRUST = 1, 2, 3, 4, 7, 10, 11
 _STILL, _LAST = 12, 13  # time without any change; position, velocity, attitude
-_NOW, _STEADY = (
-    23,
-    24,
-)  # whether the distance changes faster than that of a taut cable; time in which it did not
+# Whether the distance changes faster than that of a taut cable; time in which it did not; the acceleration that
+# lacks (3), and whether it counts as wind for the others.
+_NOW, _STEADY, _LACK, _COUNTS = 23, 24, 25, 28
+
+BRAKED = 0.8
+"""Speed over its filtered value below which the ends of a cable are stopped: it has come taut, and is not cut."""
+LEAST_UP = 0.5
+"""Least vertical part of the axis by which a drone alone judges its thrust."""
+
+
+@inline
+def _lacking(i, axis, windy, across, along, memory):  # type: ignore[no-untyped-def]
+    """The acceleration that a drone lacks along its thrust, less the level one that the others lack on average.
+
+    ``windy`` drones count, with the sums ``across`` and ``along`` of what they lack. Where none of the others
+    does, all that this one lacks in the level is taken for wind, and its thrust is judged by what lacks upwards.
+    """
+    o = _SLOTS * i
+    x, y, z = memory[o + _LACK], memory[o + _LACK + 1], memory[o + _LACK + 2]
+    own = memory[o + _COUNTS]
+    rest = windy - own
+    if rest < 0.5:
+        return z / max(axis[2], LEAST_UP)
+    wx, wy = (across - own * x) / rest, (along - own * y) / rest
+    return axis[0] * (x - wx) + axis[1] * (y - wy) + axis[2] * z
 
 
 @kernel(SIGNATURE)
@@ -33,8 +55,9 @@ def _judge(  # type: ignore[no-untyped-def]
     n = positions.shape[0]
     tau, hold, fast, longer = params[0], params[1], params[2], params[3]
     learn, deficit, frozen, g = params[4], params[5], params[6], params[7]
+    astray, tug = params[8], params[9]
     keep = math.exp(-dt / tau)
-    moving = 0.0
+    moving = windy = across = along = 0.0
     for i in range(n):
         o = _SLOTS * i
         m = params[_HEAD + i]
@@ -51,17 +74,18 @@ def _judge(  # type: ignore[no-untyped-def]
             memory[o + _LENGTH] = memory[o + _DISTANCE] = d
             for k in range(3):
                 memory[o + _V + k] = velocities[i, k]
-        speed = lacking = 0.0
+        speed = went = 0.0
         for k in range(3):
             speed += alpha[k] * (load[1, k] - velocities[i, k])
             expected = (thrusts[i] * axis[k] + tensions[i] * alpha[k]) / m
             if k == 2:
                 expected -= g
-            # Both through the same filter: (v - filtered v) / tau is the filtered acceleration.
+            # Both through the same filter: what is new in the speed, over the step, is the filtered acceleration.
+            fresh = (1.0 - keep) * (velocities[i, k] - memory[o + _V + k])
             memory[o + _P + k] = keep * memory[o + _P + k] + (1.0 - keep) * expected
-            memory[o + _V + k] = keep * memory[o + _V + k] + (1.0 - keep) * velocities[i, k]
-            observed = (velocities[i, k] - memory[o + _V + k]) * (1.0 - keep) / (keep * dt)
-            lacking += axis[k] * (memory[o + _P + k] - observed)
+            memory[o + _V + k] += fresh
+            memory[o + _LACK + k] = memory[o + _P + k] - fresh / dt
+            went += velocities[i, k] * velocities[i, k]
         memory[o + _SPEED] = keep * memory[o + _SPEED] + (1.0 - keep) * speed
         memory[o + _DISTANCE] = keep * memory[o + _DISTANCE] + (1.0 - keep) * d
 
@@ -74,10 +98,9 @@ def _judge(  # type: ignore[no-untyped-def]
             memory[o + _STEADY] = min(memory[o + _STEADY] + dt, learn)
             memory[o + _LENGTH] += dt / memory[o + _STEADY] * stretch
         known = memory[o + _STEADY] > 0.5 * learn
-        apart = known and changing and memory[o + _SPEED] > 0.0 and stretch > longer
+        apart = changing and memory[o + _SPEED] > 0.0 and speed > BRAKED * memory[o + _SPEED]
+        apart = apart and known and stretch > longer
         memory[o + _CABLE] = memory[o + _CABLE] + dt if apart else 0.0
-        weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
-        memory[o + _THRUST] = memory[o + _THRUST] + dt if weak else 0.0
 
         still = True
         for k in range(10):
@@ -90,12 +113,33 @@ def _judge(  # type: ignore[no-untyped-def]
             still = still and value == memory[o + _LAST + k]
             memory[o + _LAST + k] = value
         memory[o + _STILL] = memory[o + _STILL] + dt if still else 0.0
+        went = math.sqrt(went) * memory[o + _STILL]
+
+        # Who is under suspicion says nothing of the wind.
+        trusted = memory[o + _THRUST] == 0.0 and not apart and memory[o + _STILL] <= hold
+        memory[o + _COUNTS] = 1.0 if trusted else 0.0
+        windy += memory[o + _COUNTS]
+        across += memory[o + _COUNTS] * memory[o + _LACK]
+        along += memory[o + _COUNTS] * memory[o + _LACK + 1]
+        if 0.0 < frozen <= memory[o + _STILL] or 0.0 < astray <= went:
+            carrying[i] = 0.0
     for i in range(n):
         o = _SLOTS * i
+        m = params[_HEAD + i]
+        axis = quaternion.third_axis(
+            attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
+        )
+        lacking = _lacking(i, axis, windy, across, along, memory)
+        weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
+        memory[o + _THRUST] = memory[o + _THRUST] + dt if weak else 0.0
         # If most distances change, it is the load that is seen wrongly, or let go.
         if memory[o + _CABLE] >= hold and (n == 1 or 2.0 * moving <= n):
             carrying[i] = 0.0
-        if memory[o + _THRUST] >= hold or 0.0 < frozen <= memory[o + _STILL]:
+        # A drone that falls lets its cable go slack; as long as that is taut, it may pull more than it should.
+        loose = (
+            memory[o + _SPEED] < -0.5 * fast or memory[o + _DISTANCE] < memory[o + _LENGTH] - longer
+        )
+        if memory[o + _THRUST] >= (hold if n == 1 or loose else max(hold, tug)):
             carrying[i] = 0.0
 
 
@@ -104,14 +148,19 @@ class Residuals(DetectionPart):
 
     First: the distance between drone and load is constant while the cable is taut, whatever the wind and the
     masses. It grows beyond the learned length, at some speed, when the cable is cut. If that of more than half of
-    the team changes, the load's sensors are suspected instead and no cable is.
+    the team changes, the load's sensors are suspected instead and no cable is. Ends that slow down have been caught
+    by their cable; late measurements, carried forward, overshoot its length meanwhile.
 
     Second: along its thrust, a drone's filtered acceleration is compared with what commanded thrust, wanted
-    tension and weight would give (a momentum observer; De Luca and Mattone, ICRA 2005). Wind is part of the
-    difference, so the deficit must be large.
+    tension and weight would give (a momentum observer; De Luca and Mattone, ICRA 2005). The wind is part of the
+    difference. It blows level and on all alike, so what the other drones lack in the level, on average, is taken
+    from it; who is under suspicion does not count among them. A drone with no such others is judged by what it
+    lacks upwards. A cable that pulls more than it should looks the same, but only while it is taut: a drone that falls
+    slackens its cable. One that does not is given up only after ``tug``, unless it is alone.
 
-    Third, where asked for: a drone of which no number changes for a while is not measured any more. Noise never
-    repeats itself, but perfect sensors of a drone in balance may.
+    Third: a drone of which no number changes is not measured any more when its own speed says that it went on for
+    ``astray`` meanwhile, or, where asked for, after a while (``frozen``): noise never repeats itself, but perfect
+    sensors of a drone in balance may.
     """
 
     kernel = _judge
@@ -126,14 +175,18 @@ class Residuals(DetectionPart):
     """Length by which they do, m."""
     learning: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
     """Time over which a cable's length is averaged, s; after half of it the cable is watched."""
-    deficit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+    deficit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.45
     """Share of the commanded thrust that lacks."""
     frozen: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
     """Time for which nothing that is known of a drone changes, s; 0: not looked at."""
+    astray: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
+    """Distance that a drone would have gone at its speed while nothing that is known of it changes, m; 0: not looked at."""
+    tug: Annotated[float, Field(ge=0.0, le=10.0)] = 0.2
+    """Time for which thrust must lack on a cable that stays taut, s."""
 
     def params(self, team: Team) -> Vector:
         head = [self.filter, self.hold, self.speed, self.length, self.learning, self.deficit]
-        return np.array([*head, self.frozen, team.gravity, *team.masses])
+        return np.array([*head, self.frozen, team.gravity, self.astray, self.tug, *team.masses])
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(_SLOTS * team.n)
