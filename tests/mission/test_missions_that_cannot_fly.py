@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+from colift.allocation._hover import RESERVE
 from colift.errors import MissionError
 from colift.mission import load_mission
 from colift.simulation.flight import Flight
@@ -45,22 +46,41 @@ def test_motors_just_too_weak_are_refused_with_needed_and_given_thrust(thrust):
     assert "34.5 degrees from the vertical" in problem.message
 
 
-def test_the_border_is_where_hover_in_the_formation_flown_needs_all_of_the_thrust():
+def test_motors_that_hold_but_leave_nothing_to_control_with_are_refused():
+    """1.95 N a motor: hover needs 7.55 of 7.8 N."""
+    with pytest.raises(MissionError) as refused:
+        load_mission(WEAK, {"actuation.max_thrust": 1.95})
+    (problem,) = refused.value.problems
+    assert problem.path == "actuation.max_thrust"
+    assert "leave 3.2 % of their thrust to control with" in problem.message
+    assert "needs 7.547 N and its motors give 7.8 N" in problem.message
+    assert "5 % are kept in reserve (7.41 N are left for hover)" in problem.message
+    load_mission(WEAK, {"actuation.max_thrust": 1.95}, must_fly=False)
+
+
+def test_the_weakest_drone_for_what_it_has_is_named():
+    """Drone 2 needs the same as the others of less."""
+    with pytest.raises(MissionError, match=r"drone 2 needs 7\.\d+ N and its motors give 7\.8 N"):
+        load_mission(WEAK, {"actuation.max_thrust": [2.2, 2.3, 1.95, 2.1]})
+    load_mission(WEAK, {"actuation.max_thrust": [2.2, 2.3, 2.0, 2.1]})
+
+
+def test_the_border_is_where_hover_in_the_formation_flown_leaves_the_reserve():
     flight = Flight(load_mission(WEAK, {"actuation.max_thrust": 2.2}))
     r = flight.run()
     tilt = np.arccos(-r["desired_directions"][-1, :, 2])
     tension = 9.81 / 4.0 / np.cos(tilt)
     needed = np.hypot(0.5 * 9.81 + tension * np.cos(tilt), tension * np.sin(tilt)).max()
-    border = needed / 4.0
+    border = needed / 4.0 / (1.0 - RESERVE)
     load_mission(WEAK, {"actuation.max_thrust": 1.003 * border})
-    with pytest.raises(MissionError, match="too weak"):
+    with pytest.raises(MissionError, match="reserve"):
         load_mission(WEAK, {"actuation.max_thrust": 0.997 * border})
 
 
 def test_what_is_refused_would_sink_and_what_is_not_holds():
     weak = load_mission(WEAK, {"actuation.max_thrust": 1.87}, must_fly=False)
     assert Flight(weak).run()["load"][-1, 0, 2] < 1.0
-    strong = Flight(load_mission(WEAK, {"actuation.max_thrust": 1.95, "timing.duration": 12.0}))
+    strong = Flight(load_mission(WEAK, {"actuation.max_thrust": 2.0, "timing.duration": 12.0}))
     assert strong.run()["load"][-1, 0, 2] == pytest.approx(2.0, abs=0.02)
 
 
@@ -92,6 +112,7 @@ def test_the_commands_refuse_and_judge(tmp_path):
     flown = colift("run", str(file), "--out", str(tmp_path / "out"))
     assert flown.returncode == 2  # as for any mistake in a mission
     assert "motors are too weak" in flown.stderr
+    assert "5 % are kept in reserve" in flown.stderr
     assert not (tmp_path / "out").exists()
     judged = colift("feasibility", str(file), "--json")
     assert judged.returncode == 1
@@ -107,6 +128,19 @@ def test_the_commands_refuse_and_judge(tmp_path):
     own = 0.5 * 9.81
     pull = math.sqrt(7.48**2 - (own * math.sin(cone)) ** 2) - own * math.cos(cone)
     assert found["heaviest_N"] == pytest.approx(4.0 * pull * math.cos(cone), rel=3e-3)
+
+
+@pytest.mark.parametrize(("thrust", "codes"), [(1.98, (2, 1)), (1.993, (0, 0))])
+def test_commands_agree_on_the_reserve(tmp_path, thrust, codes):
+    tomli_w = pytest.importorskip("tomli_w")
+    file, out = tmp_path / "weak.toml", tmp_path / "out"
+    given = {"actuation": {"kind": "motors", "max_thrust": thrust}}
+    file.write_text(tomli_w.dumps(WEAK | given))
+    flown = colift("run", str(file), "--set", "timing.duration=0.5", "--out", str(out))
+    judged = colift("feasibility", str(file))
+    assert (flown.returncode, judged.returncode) == codes
+    for told in (flown.stderr, judged.stdout):
+        assert ("kept in reserve" in " ".join(told.split())) is (codes[0] != 0)
 
 
 def test_wind_is_said_to_be_left_out():
