@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import tomllib
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 import colift
 from colift import part
-from colift.allocation._oracle import Limits, TensionProblem
+from colift.allocation._oracle import Limits, TensionProblem, beyond_saddles, outcome_of
 from colift.allocation.base import Allocator, Status
 from colift.allocation.internal_force import InternalForce
 from colift.allocation.min_norm import MinNorm
@@ -292,6 +293,82 @@ def test_rotations_take_one_vector_to_the_other_the_short_way():
 
 
 # ---------------------------------------------------------------- general solvers
+
+
+def bunched(n, apart, seed):
+    """Directions (n, 3) about ``apart`` radians from one that leans a little."""
+    rng = np.random.default_rng(seed)
+    directions = np.array([0.1, 0.05, -1.0]) + apart * rng.normal(size=(n, 3))
+    return directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("kind", ORACLES)
+@pytest.mark.parametrize("apart", [0.0, 1e-9, 1e-6, 1e-3, 0.05])
+@pytest.mark.parametrize(("n", "mu"), [(2, 0.15), (3, 0.4), (4, 0.15), (4, 1.35), (6, 0.75)])
+def test_no_saddle_at_coincident_cables_passes_for_the_optimum(kind, n, mu, apart):
+    """Cables that all hang along the force have no slope, but the cost falls when they part."""
+    each = allocator(kind, n, mu=mu)
+    each.reset(
+        directions=np.tile([0.0, 0.0, -1.0], (n, 1)) if apart == 0.0 else bunched(n, apart, n)
+    )
+    answer = each.allocate(HOVER)
+    best = SqpAllocator(n, mu=mu).allocate(HOVER).objective
+    assert answer.force_residual < 1e-9
+    assert (
+        answer.status is Status.CONVERGED
+    )  # elsewhere it may say that it is not, never this of a saddle
+    assert answer.objective == pytest.approx(best, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ORACLES)
+def test_coincident_cables_within_limits_part_too(kind):
+    n = 4
+    each = allocator(kind, n, mu=0.75, max_cone_deg=60.0, tension_max=5.0)
+    each.reset(directions=np.tile([0.0, 0.0, -1.0], (n, 1)))
+    answer = each.allocate(HOVER)
+    again = allocator(kind, n, mu=0.75, max_cone_deg=60.0, tension_max=5.0).allocate(HOVER)
+    assert answer.status is again.status is Status.CONVERGED
+    assert answer.objective == pytest.approx(again.objective, rel=1e-5)
+
+
+def test_a_saddle_from_which_nothing_leads_on_is_not_converged():
+    n = 4
+    asked = TensionProblem(n, 0.75 / 2.207**2, UP)
+    z = np.concatenate([np.full(n, 1.0 / n), np.tile(-UP, n)])
+    assert asked.violation(z) == 0.0
+    assert asked.stationarity(z) < 1e-12
+    stuck, further = beyond_saddles(asked, z, 1e-6, lambda _: (z, 3))
+    np.testing.assert_array_equal(stuck, z)
+    assert further == 3
+    assert outcome_of(asked, z, 1e-6, 1).status is Status.ITERATION_LIMIT
+
+
+@pytest.mark.parametrize("limits", [Limits(), Limits(0.02, 2.0, math.cos(0.5), -math.cos(1.0))])
+def test_curvature_of_the_lagrangian_is_that_of_differences(limits):
+    n, rng = 4, np.random.default_rng(4)
+    force = np.array([0.1, -0.2, 1.0]) / np.linalg.norm([0.1, -0.2, 1.0])
+    asked = TensionProblem(n, 0.3, force, limits)
+    T, alpha = rng.uniform(0.2, 0.5, n), ring(n, 0.6)
+    if limits.pairs:  # two cables as near as they may be
+        alpha[1] = np.cos(0.5) * alpha[0] + np.sin(0.5) * np.cross(
+            alpha[0], alpha[2]
+        ) / np.linalg.norm(np.cross(alpha[0], alpha[2]))
+    z = np.concatenate([T, alpha.ravel()])
+    rows = [
+        *asked.equalities_jacobian(z),
+        *asked.inequalities_jacobian(z)[asked.inequalities(z) < 1e-6],
+    ]
+    assert len(rows) > 3 + n or not limits.pairs
+    multipliers = rng.normal(size=len(rows))
+    work = asked.inequalities(z) < 1e-6
+
+    def slope(z):
+        rows = np.vstack([asked.equalities_jacobian(z), asked.inequalities_jacobian(z)[work]])
+        return asked.gradient(z) - rows.T @ multipliers
+
+    h = 1e-6
+    numeric = [(slope(z + h * e) - slope(z - h * e)) / (2.0 * h) for e in np.eye(4 * n)]
+    np.testing.assert_allclose(asked._lagrangian_hessian(z, multipliers), numeric, atol=1e-8)
 
 
 @pytest.mark.parametrize("kind", ORACLES)

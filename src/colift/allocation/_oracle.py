@@ -7,6 +7,7 @@ so tensions are in shares of it and ``mu`` is that of the paper over its square.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -46,6 +47,13 @@ class Limits(NamedTuple):
     def cone(self) -> bool:
         return self.height_max < 1.0
 
+
+FLAT = 1e-6
+"""Curvature, relative to that of a tension or to ``mu``, down to which a direction counts as flat."""
+KICKS = 5
+"""Times that a solver is sent on from a saddle."""
+KICK = 0.05
+"""Length of the step off a saddle."""
 
 FREE = Limits()
 """No limits but that tensions are not negative: the paper's problem."""
@@ -124,15 +132,65 @@ class TensionProblem:
 
     def stationarity(self, z: Array) -> float:
         """Largest slope of the objective that no constraint at work explains (least squares)."""
+        slope, rows, multipliers, _ = self._multipliers(z)
+        return float(np.abs(slope - rows.T @ multipliers).max(initial=0.0))
+
+    def _multipliers(self, z: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        """Slope, constraints at work, their multipliers; of the variables that no bound holds, the last."""
         T = z[: self.n]
-        work = self.inequalities(z) < 1e-6
+        work: NDArray[np.bool_] = self.inequalities(z) < 1e-6
         rows = np.vstack([self.equalities_jacobian(z), self.inequalities_jacobian(z)[work]])
         free = np.ones(4 * self.n, dtype=bool)
         room = np.minimum(T - self.limits.tension_min, self.limits.tension_max - T)
         free[: self.n] = room > 1e-9
         slope, rows = self.gradient(z)[free], rows[:, free]
-        multipliers = np.linalg.lstsq(rows.T, slope, rcond=None)[0]
-        return float(np.abs(slope - rows.T @ multipliers).max(initial=0.0))
+        multipliers: Array = np.linalg.lstsq(rows.T, slope, rcond=None)[0].astype(float, copy=False)
+        return slope, rows, multipliers, free
+
+    def descent(self, z: Array) -> Array | None:
+        """A unit direction from the stationary point ``z`` in which the objective falls to second order.
+
+        It leaves the constraints at work as they are; none where ``z`` is a minimum to second order.
+        """
+        _, rows, multipliers, free = self._multipliers(z)
+        if not free.any():
+            return None
+        curvature = self._lagrangian_hessian(z, multipliers)[np.ix_(free, free)]
+        _, sizes, right = np.linalg.svd(rows)
+        along = right[np.count_nonzero(sizes > 1e-9 * max(float(sizes[0]), 1.0)) :].T
+        if along.shape[1] == 0:
+            return None
+        values, vectors = np.linalg.eigh(along.T @ curvature @ along)
+        if values[0] >= -FLAT * max(1.0, self.mu):
+            return None
+        direction = np.zeros(4 * self.n)
+        direction[free] = along @ vectors[:, 0]
+        return direction
+
+    def _lagrangian_hessian(self, z: Array, multipliers: Array) -> Array:
+        """Second derivative of objective less multipliers times constraints at work."""
+        n = self.n
+        _, alpha = self.split(z)
+        gram, eye = alpha @ alpha.T, np.eye(3)
+        # Of c_ij^2: 2 alpha_j alpha_j^T on the diagonal, 2 (c_ij I + alpha_j alpha_i^T) beside it.
+        blocks = gram[:, :, None, None] * eye + alpha[None, :, :, None] * alpha[:, None, None, :]
+        balance, norms = multipliers[:3], multipliers[3 : 3 + n]
+        own = alpha.T @ alpha - alpha[:, :, None] * alpha[:, None, :]
+        blocks[range(n), range(n)] = own
+        blocks *= 2.0 * self.mu
+        blocks[range(n), range(n)] -= 2.0 * norms[:, None, None] * eye
+        work = self.inequalities(z) < 1e-6
+        pairs = np.flatnonzero(work[: len(self.near)]) if self.limits.pairs else np.zeros(0, int)
+        for pair, multiplier in zip(pairs, multipliers[3 + n :], strict=False):
+            i, j = self.near[pair], self.far[pair]
+            blocks[i, j] += multiplier * eye
+            blocks[j, i] += multiplier * eye
+        hessian = np.zeros((4 * n, 4 * n))
+        hessian[:n, :n] = np.eye(n)
+        hessian[n:, n:] = blocks.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+        hessian[:n, n:] = -np.kron(np.eye(n), balance)
+        hessian[n:, :n] = hessian[:n, n:].T
+        return hessian
 
 
 _NO_LIMIT = 1e300  # N
@@ -186,6 +244,31 @@ def tension_problem(problem: Problem) -> TensionProblem:
     return TensionProblem(len(problem.shares), mu / scale**2, problem.force, limits)
 
 
+def beyond_saddles(
+    asked: TensionProblem, z: Array, tolerance: float, solve: Callable[[Array], tuple[Array, int]]
+) -> tuple[Array, int]:
+    """The point ``z`` of a solver, sent on from there while it is a saddle; and further iterations.
+
+    Symmetric starts, such as coincident cables, end at saddles: every solver there is content with a slope
+    of zero. ``solve`` starts anew from a point and tells its own and its iterations.
+    """
+    further = 0
+    for _ in range(KICKS):
+        if not (
+            asked.violation(z) <= 1e-4 and asked.stationarity(z) <= tolerance * max(1, asked.mu)
+        ):
+            break
+        direction = asked.descent(z)
+        if direction is None:
+            break
+        found, iterations = solve(z + KICK * direction)
+        further += iterations
+        if not (asked.violation(found) <= 1e-4 and asked.objective(found) < asked.objective(z)):
+            break
+        z = found
+    return z, further
+
+
 def outcome_of(asked: TensionProblem, z: Array, tolerance: float, iterations: int) -> Outcome:
     """Judge a solver's point by what it is, not by what the solver says."""
     if not asked.violation(z) <= 1e-4:
@@ -197,7 +280,8 @@ def outcome_of(asked: TensionProblem, z: Array, tolerance: float, iterations: in
     alpha /= np.linalg.norm(alpha, axis=1, keepdims=True)
     z = np.concatenate([T, alpha.ravel()])
     residual = asked.stationarity(z) / max(1.0, asked.mu)
-    status = Status.CONVERGED if residual <= tolerance else Status.ITERATION_LIMIT
+    converged = residual <= tolerance and asked.descent(z) is None
+    status = Status.CONVERGED if converged else Status.ITERATION_LIMIT
     objective = asked.objective(z)
     gap = objective - newton.optimal_objective(asked.n, asked.mu)
     return Outcome(pulls, status, iterations, residual, objective, gap)

@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from colift.allocation._oracle import Limits, Oracle, TensionProblem, outcome_of, tension_problem
+from colift.allocation._oracle import (
+    Limits,
+    Oracle,
+    TensionProblem,
+    beyond_saddles,
+    outcome_of,
+    tension_problem,
+)
 from colift.allocation._plain import Outcome, Problem, plain_kernel
 from colift.interrupts import heard
 from colift.part import Vector
@@ -115,9 +122,16 @@ def _answer(problem: Problem) -> Outcome:
     if not account["success"] and warm is not None:
         answer, account = minimise(asked, z, SHARPER * tolerance, most)
         iterations += int(account["iter_count"])
-    memory[0] = float(account["success"])
-    z, lam_x[:], lam_g[:] = (answer[name].full().ravel() for name in ("x", "lam_x", "lam_g"))
-    return outcome_of(asked, z, tolerance, iterations)
+
+    def solve(z: Vector) -> tuple[Vector, int]:
+        nonlocal answer, account
+        answer, account = minimise(asked, z, SHARPER * tolerance, most)
+        return answer["x"].full().ravel(), int(account["iter_count"])
+
+    z, further = beyond_saddles(asked, answer["x"].full().ravel(), tolerance, solve)
+    memory[0] = float(account["success"] and np.array_equal(z, answer["x"].full().ravel()))
+    lam_x[:], lam_g[:] = (answer[name].full().ravel() for name in ("lam_x", "lam_g"))
+    return outcome_of(asked, z, tolerance, iterations + further)
 
 
 class Ipopt(Oracle):
@@ -127,7 +141,8 @@ class Ipopt(Oracle):
     large-scale nonlinear programming", Mathematical Programming 106, 2006; derivatives by CasADi. An oracle:
     some thousand times slower than ``sqp``. The limits that may be added are those of ``safe``, in every
     answer that is ``CONVERGED``; where they cannot hold the status is ``NUMERICAL_FAILURE`` and the last
-    directions are kept.
+    directions are kept. From a saddle, such as coincident cables, it is sent on; one that it does not leave
+    is not ``CONVERGED``.
     """
 
     kernel = plain_kernel(_solve)

@@ -6,7 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from colift.allocation._oracle import Oracle, TensionProblem, outcome_of, tension_problem
+from colift.allocation._oracle import (
+    Oracle,
+    TensionProblem,
+    beyond_saddles,
+    outcome_of,
+    tension_problem,
+)
 from colift.allocation._plain import Outcome, Problem, plain_kernel
 from colift.part import Vector
 
@@ -34,8 +40,14 @@ def _solve(problem: Problem) -> Outcome:
     asked = tension_problem(problem)
     tolerance, iterations = float(problem.params[1]), int(problem.params[2])
     z = np.concatenate([problem.shares, problem.directions.ravel()])
-    answer = minimise(asked, z, tolerance, iterations)
-    return outcome_of(asked, np.asarray(answer.x), tolerance, int(answer.nit))
+
+    def solve(z: Vector) -> tuple[Vector, int]:
+        answer = minimise(asked, z, tolerance, iterations)
+        return np.asarray(answer.x), int(answer.nit)
+
+    z, needed = solve(z)
+    z, further = beyond_saddles(asked, z, tolerance, solve)
+    return outcome_of(asked, z, tolerance, needed + further)
 
 
 class Slsqp(Oracle):
@@ -44,7 +56,8 @@ class Slsqp(Oracle):
     Kraft, "A software package for sequential quadratic programming", DFVLR-FB 88-28, 1988. An oracle:
     some thousand times slower than ``sqp``. The limits that may be added are those of ``safe``, in every
     answer that is ``CONVERGED``; where they cannot hold the status is ``NUMERICAL_FAILURE`` and the last
-    directions are kept.
+    directions are kept. From a saddle, such as coincident cables, it is sent on; one that it does not leave
+    is not ``CONVERGED``.
     """
 
     kernel = plain_kernel(_solve)
