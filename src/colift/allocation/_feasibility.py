@@ -326,7 +326,7 @@ def _spread_formations(n: int, cone: float, min_angle: float) -> tuple[Array, ..
     if n == 1:
         return (ring(1, 0.0),)
     inner = cone * 0.999
-    spread = (_spread(start, inner, 1.03 * min_angle + 1e-3) for start in _starts(n, inner))
+    spread = _spread(np.array(list(_starts(n, inner))), inner, 1.03 * min_angle + 1e-3)
     found = tuple(each for each, angle in spread if angle > min_angle * _ROOM)[: FORMATIONS // 2]
     if not found:
         each, angle = widest_formation(n, inner)
@@ -416,24 +416,33 @@ def widest_angle(n: int, cone: float) -> float:
 
 def most_cables(min_angle: float, cone: float) -> tuple[int, int]:
     """How many cables ``min_angle`` (rad) allows in the cone: found, and never more than; up to ``SEARCHED``."""
-    found = 1
-    while found < SEARCHED and widest_formation(found + 1, cone, enough=min_angle)[1] >= min_angle:
-        found += 1
-    bound = found
+    bound = 1
     while bound < SEARCHED and packing_bound(bound + 1, cone) >= min_angle:
         bound += 1
+
+    def fit(n: int) -> bool:
+        return widest_formation(n, cone, enough=min_angle)[1] >= min_angle
+
+    found = max(1, int(0.65 * bound))  # which is nearly always held
+    while found > 1 and not fit(found):
+        found -= 1
+    while found < bound and fit(found + 1):
+        found += 1
     return found, bound
 
 
 @lru_cache(maxsize=64)
 def _search(n: int, cone: float, enough: float) -> tuple[Array, float]:
+    """The formation of the first start that reaches ``enough``, or else the widest of all."""
+    starts = list(_starts(n, cone))
     best, angle = ring(n, cone), -1.0
-    for start in _starts(n, cone):
-        found, reached = _spread(start, cone, enough)
-        if reached > angle:
-            best, angle = found, reached
-        if angle >= enough:
-            break
+    # Most often one of the first two does, and then the others need no look.
+    for some in (starts[:1], starts[1:2], starts[2:]):
+        for found, reached in _spread(np.array(some), cone, enough):
+            if reached > angle:
+                best, angle = found, reached
+            if angle >= enough:
+                return best, angle
     return best, angle
 
 
@@ -472,33 +481,46 @@ def _cap(share: NDArray[np.floating], azimuth: NDArray[np.floating], cone: float
     return -np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
 
 
-def _spread(start: Array, cone: float, enough: float) -> tuple[Array, float]:
-    """Repulsion with a power law that hardens, inside the cone; the best formation on the way."""
-    x = _clip(start + 1e-4 * np.cos(np.arange(start.size)).reshape(start.shape), cone)
-    best, angle = start, float(pairwise_angles(start).min())
-    for k in range(STEPS):
-        progress = k / STEPS
+def _spread(starts: Array, cone: float, enough: float) -> list[tuple[Array, float]]:
+    """Repulsion with a power law that hardens, inside the cone; from each start (k, n, 3) the best formation on the way.
+
+    All starts at once: many small arrays cost more than one larger one. A start is left once it has ``enough``.
+    """
+    k, n = starts.shape[:2]
+    best = starts.copy()
+    angle = np.array([pairwise_angles(start).min() for start in starts])
+    live = np.flatnonzero(angle < enough)
+    x = _clip(starts[live] + 1e-4 * np.cos(np.arange(3 * n)).reshape(n, 3), cone)
+    diagonal = np.arange(n)
+    for turn in range(STEPS):
+        if not live.size:
+            break
+        progress = turn / STEPS
         power = 5.0 * 150.0**progress
         step = 0.15 * (0.002 / 0.3) ** progress
-        squared = np.maximum(2.0 - 2.0 * (x @ x.T), 1e-12)
-        np.fill_diagonal(squared, 9.0)
-        nearest = float(squared.min())
-        reached = 2.0 * math.asin(min(0.5 * math.sqrt(nearest), 1.0))
-        if reached > angle:
-            best, angle = x, reached
-            if angle >= enough:
-                break
-        weights = (nearest / squared) ** power
-        push = weights.sum(axis=1, keepdims=True) * x - weights @ x
-        x = _clip(x + step * push / max(float(np.linalg.norm(push, axis=1).max()), 1e-12), cone)
-    return best, angle
+        squared = np.maximum(2.0 - 2.0 * np.matmul(x, x.transpose(0, 2, 1)), 1e-12)
+        squared[:, diagonal, diagonal] = 9.0
+        nearest = squared.min(axis=(1, 2))
+        reached = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(nearest), 1.0))
+        wider = reached > angle[live]
+        if wider.any():
+            angle[live[wider]], best[live[wider]] = reached[wider], x[wider]
+            going = angle[live] < enough
+            if not going.all():
+                live, x, squared, nearest = live[going], x[going], squared[going], nearest[going]
+        weights = (nearest[:, None, None] / squared) ** power
+        push = weights.sum(axis=2, keepdims=True) * x - np.matmul(weights, x)
+        size = np.maximum(np.linalg.norm(push, axis=2).max(axis=1), 1e-12)
+        x = _clip(x + step * push / size[:, None, None], cone)
+    return [(best[i], float(angle[i])) for i in range(k)]
 
 
 def _clip(x: Array, cone: float) -> Array:
-    """Unit directions, those outside the cone moved to its rim."""
-    x = x / np.linalg.norm(x, axis=1, keepdims=True)
-    outside = -x[:, 2] < math.cos(cone)
-    radius = np.maximum(np.hypot(x[:, 0], x[:, 1]), 1e-12)
-    x[outside, :2] *= (math.sin(cone) / radius)[outside, None]
-    x[outside, 2] = -math.cos(cone)
+    """Unit directions (..., 3), those outside the cone moved to its rim."""
+    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    outside = -x[..., 2] < math.cos(cone)
+    rim = x[outside]
+    rim[:, :2] *= (math.sin(cone) / np.maximum(np.hypot(rim[:, 0], rim[:, 1]), 1e-12))[:, None]
+    rim[:, 2] = -math.cos(cone)
+    x[outside] = rim
     return x
