@@ -63,10 +63,12 @@ def test_motors_too_weak_are_refused_before_the_flight(thrust):
 
 
 def test_motors_with_little_to_spare_are_warned_of():
-    """They hold the load still, with 3 % of their thrust left."""
-    (warning,) = warnings_of(load_mission(WEAK, {"actuation.max_thrust": 1.95}))
+    """With 3 % of their thrust left nothing is there to control with; with 6 % it is little."""
+    with pytest.raises(MissionError, match=r"leave 3\.2 % of their thrust to control with"):
+        load_mission(WEAK, {"actuation.max_thrust": 1.95})
+    (warning,) = warnings_of(load_mission(WEAK, {"actuation.max_thrust": 2.0}))
     assert warning.path == "actuation.max_thrust"
-    assert "leaves 3.2 % of thrust to spare" in warning.message
+    assert "leaves 5.7 % of thrust to spare" in warning.message
     assert warnings_of(load_mission(WEAK, {"actuation.max_thrust": 3.0})) == []
 
 
