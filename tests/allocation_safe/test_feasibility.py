@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -136,6 +138,23 @@ def test_tilt_and_unequal_drones_count():
     tilted = feasibility(team, Safe(tension_max=50.0, max_thrust=12.0, max_tilt_deg=8.0))
     assert tilted.heaviest < 0.95 * free
     assert tilted.binding[0].path in ("allocation.max_tilt_deg", "allocation.max_thrust")
+
+
+def test_ipopt_finds_no_heavier_load_for_random_teams(monkeypatch):
+    """Of the teams of docs/figures/feasibility.py the first; there are all, and more starts."""
+    pytest.importorskip("casadi", reason="optional: the extra ipopt (casadi)")
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs" / "figures")
+    against = importlib.import_module("feasibility")
+    rng = np.random.default_rng(against.SEED)
+    held = 0
+    for k in range(8):
+        team, safe, motors, _ = against.draw(rng)
+        heaviest, missed, _, _ = against.by_colift(team, safe, motors)
+        theirs = against.by_ipopt(team, safe, motors, np.random.default_rng(k), starts=6)
+        assert missed < against.KEPT
+        assert heaviest >= (1.0 - against.CLOSE) * theirs
+        held += theirs > 0.95 * heaviest > 0.0
+    assert held >= 6  # IPOPT did its work: the comparison is not empty
 
 
 def test_tensions_along_given_cables_are_those_of_a_linear_programme():
