@@ -140,6 +140,15 @@ def test_tilt_and_unequal_drones_count():
     assert tilted.binding[0].path in ("allocation.max_tilt_deg", "allocation.max_thrust")
 
 
+def test_three_drones_that_may_hardly_tilt_are_judged_by_narrow_formations():
+    limits = Limits(
+        weights=np.array([21.85, 6.52, 6.19]), low=np.array([1.4, 1.76, 2.67]), high=np.array([184.5, 15.89, 132.2]),
+        thrust=np.array([81.37, 24.64, 19.66]), cone=math.radians(58.0), min_angle=math.radians(43.0),
+        tilt=math.radians(12.5),
+    )  # fmt: skip
+    assert extreme(limits, formations(3, limits)).weight > 63.5  # wide ones alone: 26.4
+
+
 def test_ipopt_finds_no_heavier_load_for_random_teams(monkeypatch):
     """Of the teams of docs/figures/feasibility.py the first; there are all, and more starts."""
     pytest.importorskip("casadi", reason="optional: the extra ipopt (casadi)")

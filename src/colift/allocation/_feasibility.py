@@ -269,7 +269,9 @@ POLISHED = 10
 QUICK = 25
 """Steps of that search."""
 FORMATIONS = 24
-"""Formations from which the heaviest load is looked for."""
+"""Wide formations from which the heaviest load is looked for."""
+NARROW = (1.05, 1.3)
+"""And narrow ones: by which factor their angles exceed the least."""
 
 
 def _rings(n: int, limits: Limits, wider: float = 1.0) -> Iterator[Array]:
@@ -318,7 +320,10 @@ def formations(n: int, limits: Limits) -> Array:
     bases = len(found)
     found += [_strongest_inside(limits, each) for each in found]
     found += [found[k % bases][rng.permutation(n)] for k in range(max(0, FORMATIONS - 2 * bases))]
-    return np.array(found)
+    # Narrow ones too: drones that may hardly tilt, or hardly lift, hold nothing in a wide one.
+    narrow = [each for wider in NARROW for each in _rings(n, limits, wider)]
+    narrow = [each for each in narrow if is_within(limits, each)]
+    return np.array([*found, *narrow, *(_strongest_inside(limits, each) for each in narrow)])
 
 
 @lru_cache(maxsize=64)
