@@ -30,7 +30,7 @@ def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
     size = np.linalg.norm(thrust, axis=1)
     limits = [
         part.tension_max / sigma - T,
-        np.sum(before * w, axis=1) - part.tension_min / sigma,
+        T - part.tension_min / sigma,
         -w[:, 2] - math.cos(math.radians(part.max_cone_deg)) * T,
         part.max_thrust / sigma - size,
         thrust[:, 2] - math.cos(math.radians(part.max_tilt_deg)) * size,

@@ -76,6 +76,15 @@ FIRM = 1e-3
 """Barrier of every limit then."""
 RATE_FIRM = 0.5
 """Barrier of the rate then, in the versine of the largest turn; no more than that of the others."""
+SHARP = 0.03
+"""Part that is left in the end of what holds on to the last directions."""
+FAR = 10.0
+"""How much more than barriers can be blamed for is missing where that is done."""
+LEAN = 0.03
+"""Part of the largest turn by which a formation leans then, lest it be stuck at a saddle."""
+LEANING = 50.0
+"""Cycles for which it does so after the wanted force has changed by more than ``CHANGE`` of it."""
+CHANGE = 1e-3
 SLIGHT = 1e-3
 """Largest part of the cost that is left then."""
 RETRIES = 8
@@ -181,7 +190,7 @@ def set_up(  # type: ignore[no-untyped-def]
         if not (t > 0.0 and t < 1e300):
             t = W / n
         room = 1e-3 * (high - low)
-        low = low / (1.0 - vers) + room
+        low += room
         t = max(min(t, high - room), low)
         if params[LIMITS] > 4.0:
             cos_tilt = math.cos(params[TILT])
@@ -312,9 +321,9 @@ def active_limits(n, limits, m, z):  # type: ignore[no-untyped-def]
 
 
 @inline
-def slight_cost(n, mu, rho, delta, data):  # type: ignore[no-untyped-def]
+def slight_cost(n, mu, rho, data):  # type: ignore[no-untyped-def]
     """Part of the cost at which no marginal cost of it, of any cable, comes near the price of force."""
-    worst = max(2.0 * n * mu, rho * delta)
+    worst = max(2.0 * n * mu, rho * math.sqrt(2.0 * data[newton.VERS_RATE]))
     for i in range(n):
         worst = max(worst, data[newton.DATA * i + OMEGA] * data[newton.DATA * i + T_MAX])
     return min(SLIGHT, 0.1 * FORCE / worst)
@@ -335,7 +344,7 @@ def iterate(  # type: ignore[no-untyped-def]
     spread,
     price,
     yielding,
-    slight,
+    leaning,
     tolerance,
     max_iterations,
     pairs,
@@ -363,15 +372,18 @@ def iterate(  # type: ignore[no-untyped-def]
 
     Two phases. In the first the objective is the whole cost, and force may be missing at a price.
     Where that does not balance the force soon, the second phase asks for the force only: the cost is
-    made ``slight``, and every barrier small against the price. As soon as the force is balanced the whole cost is
-    back, and no price is high enough to give force up again: each step keeps the balance.
-    ``yielding`` starts with the second phase.
+    made slight, and every barrier small against the price. As soon as the force is balanced the whole cost is
+    back, and no price is high enough to give force up again: each step keeps the balance. Where much is
+    missing, what holds on to the last directions shrinks in the end to the part ``SHARP``, so that the cables turn as
+    far as their rate allows. ``yielding`` starts with the second phase, in which the formation leans by ``leaning`` rad.
     """
     newton.margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g)
     spread_now = spread
     iterations = 0
     waited = 0
     held = False
+    sharp = False
+    leant = False
     fresh = True
     bounded = False
     residual = math.inf
@@ -401,8 +413,12 @@ def iterate(  # type: ignore[no-untyped-def]
             fresh = True
         if fresh:
             # A phase begins: its weights, and multipliers as if this were the middle of its path.
+            if leaning > 0.0 and yielding != leant:
+                leant = yielding
+                lean(n, leaning if leant else -leaning, data)
             if yielding:
-                cost, mu_now, rho_now = slight, slight * mu, slight * rho
+                cost = slight_cost(n, mu, rho, data)
+                mu_now, rho_now = cost * mu, cost * rho
                 kappa_now, rate_now = FIRM, min(FIRM, RATE_FIRM * data[newton.VERS_RATE])
                 bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
                 spread_next = FIRM
@@ -443,11 +459,18 @@ def iterate(  # type: ignore[no-untyped-def]
             residual = newton.stationarity(n, alpha, rows, lam)
             if not fresh and yielding and residual <= tolerance * level:
                 missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
-                if missing > FIRM * (limits * n + m) or level >= 1e3:
+                blamed = FIRM * (limits * n + m)
+                if missing <= blamed and level < 1e3:
+                    level *= 10.0
+                    bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
+                elif not sharp and missing > FAR * blamed:
+                    # The turn is to be used to the full where much force is given up.
+                    sharp = True
+                    rate_now *= SHARP
+                    rho_now *= SHARP
+                else:
                     outcome = FORCE_REDUCED
                     break
-                level *= 10.0
-                bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
             if not fresh and not yielding and residual <= tolerance and held:
                 outcome = CONVERGED
                 break
@@ -490,11 +513,34 @@ def iterate(  # type: ignore[no-untyped-def]
 
 
 @inline
+def lean(n, turn, data):  # type: ignore[no-untyped-def]
+    """Turn what the proximal term holds on to by a little, rad, each cable another way.
+
+    A symmetric formation may be a saddle, which nothing symmetric ever leaves.
+    """
+    for i in range(n):
+        home = newton.DATA * i + newton.HOME
+        angle = 2.399963229728653 * i + 1.0
+        data[home] += turn * math.cos(angle)
+        data[home + 1] += turn * math.sin(angle)
+
+
+@inline
+def leaning_now(fx, fy, fz, W, delta, yielded, asked):  # type: ignore[no-untyped-def]
+    """By how much to :func:`lean`, rad; ``yielded`` counts the cycles with this force that gave force up."""
+    dx, dy, dz = fx - asked[0], fy - asked[1], fz - asked[2]
+    asked[0], asked[1], asked[2] = fx, fy, fz
+    if math.sqrt(dx * dx + dy * dy + dz * dz) > CHANGE * W:
+        yielded[0] = 1.0
+    return LEAN * delta if yielded[0] <= LEANING else 0.0
+
+
+@inline
 def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, g_new):  # type: ignore[no-untyped-def]
     """Longest step, at most 1, that leaves every limit the part ``KEEP`` of its margin; 0 if none.
 
-    Along a step most limits are concave, so that their secant gives a step that keeps them. Pairs are
-    not, but they are nearly linear within what the other limits allow, which come first. On return
+    Along a step most limits are concave, so that their secant gives a step that keeps them. Pairs and the least
+    tension are not, but they are nearly linear within what the other limits allow. On return
     ``w_new``, ``T``, ``alpha`` and ``g_new`` belong to that step.
     """
     s = 1.0

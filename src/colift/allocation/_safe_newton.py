@@ -9,7 +9,7 @@ with the force, or after recovery has moved those outside a limit) and the thrus
          + rho/2 sum |alpha_i - b_i|^2 + elastic(s)             (tie-break; force gives way)
     s.t. sum w_i + F = s
          TENSION_MAX   T_max - |w|                     >= 0     concave
-         TENSION_MIN   a.w - T_min                     >= 0     linear, inside of |w| >= T_min
+         TENSION_MIN   |w| - T_min                     >= 0     not concave
          CONE          d.w - cos(cone) |w|             >= 0     concave, d = -e3
          RATE          a.alpha - cos(delta)            >= 0     delta = max_rate dt
          THRUST        f_max - |p - w|                 >= 0     concave
@@ -94,7 +94,7 @@ def margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g):  # type: ignore
         dz = az - data[d + 2]
         versine = 0.5 * (dx * dx + dy * dy + dz * dz)
         g[o] = data[d + T_MAX] - t
-        g[o + 1] = t * (1.0 - versine) - data[d + T_MIN]
+        g[o + 1] = t - data[d + T_MIN]
         g[o + 2] = -z - data[d + COS_CONE] * t
         g[o + 3] = data[d + VERS_RATE] - versine
         if limits > 4:
@@ -263,22 +263,13 @@ def assemble(  # type: ignore[no-untyped-def]
         cos_cone = data[d + COS_CONE]
         z0, z1, z2 = z[at], z[at + 1], z[at + 2]
         g0, g1, g2 = 1.0 / g[at], 1.0 / g[at + 1], 1.0 / g[at + 2]
-        round_ = omega + (z0 + z2 * cos_cone) * inv
+        round_ = omega + (z0 - z1 + z2 * cos_cone) * inv
         c11 += round_
         c22 += round_
         htt += z0 * g0
         rt += kappa * g0
-        k1 = kappa * g1
-        f1 = z1 * g1
-        htt += f1 * near * near
-        rt -= k1 * near
-        h1 += f1 * near * e1
-        h2 += f1 * near * e2
-        q1 -= k1 * e1
-        q2 -= k1 * e2
-        c11 += f1 * e1 * e1
-        c12 += f1 * e1 * e2
-        c22 += f1 * e2 * e2
+        htt += z1 * g1
+        rt -= kappa * g1
         v = -zc - cos_cone
         f2 = z2 * g2
         k2 = kappa * g2

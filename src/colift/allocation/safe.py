@@ -85,7 +85,8 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     M = memory[o + 3 : o + 9]
     facing = memory[o + 9 : o + 12]
     yielded = memory[o + 12 : o + 13]
-    o += 13
+    asked = memory[o + 13 : o + 16]
+    o += 16
     integers = memory[o : o + 2 * n + 2 * most].view(np.int64)
     order = integers[:n]
     first = integers[n : 2 * n]
@@ -148,6 +149,9 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
         cos_max,
     )
     heavy = max(1.0, abs(fz) / n)
+    leaning = 0.0
+    if yielded[0] > 0.0:
+        leaning = cycle.leaning_now(fx, fy, fz, W, delta, yielded, asked)
     outcome = cycle.iterate(
         n,
         int(params[cycle.LIMITS]),
@@ -162,7 +166,7 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
         params[cycle.KAPPA_PAIR],
         params[cycle.PRICE] * heavy,
         yielded[0] != 0.0,
-        cycle.slight_cost(n, mu, rho, delta, data),
+        leaning,
         params[cycle.TOLERANCE],
         int(params[cycle.ITERATIONS]),
         pairs,
@@ -207,7 +211,7 @@ def _allocate(force, acceleration, dt, params, memory, tensions, directions, inf
     if W > 1e-6 and mu > 0.0 and params[cycle.EQUAL] != 0.0:
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
     reduced = balance > 1e-8 * max(1.0, sigma)
-    yielded[0] = 1.0 if reduced else 0.0
+    yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
     if relaxed and cycle.breaks_a_limit(n, order, unit, params, data, T, alpha):
         return _RECOVERING
     if reduced:
@@ -409,7 +413,7 @@ class Safe(AllocatorPart):
         pairs = n * (n - 1) // 2
         limits = newton.LIMITS * n + pairs
         cables = newton.DATA + 16 + newton.ROW + 2 * newton.RHS + 2  # 2: order, first
-        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 13)
+        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 16)
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         mu = self.mu
