@@ -13,8 +13,8 @@ from colift import safety
 from colift.allocation.base import INFO_SIZE, Status
 from colift.geometry import pairwise_angles
 
-SIZES = (2, 3, 4, 5, 6, 8, 12, 16, 24)
-DIRECTIONS = 10
+SIZES = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24)
+DIRECTIONS = 20
 """Random ones for each team; a level one along each axis besides."""
 SEED = 2711
 BEYOND = 1.2
