@@ -12,8 +12,10 @@ from pydantic import Field
 from colift.allocation.base import AllocatorPart, Status
 
 
-def share(force, acceleration, dt, params, memory, tensions, directions, info):
+def share(now, sees, params, memory, writes):
     """Least ``sum T_i^2 / charge_i`` along the directions that the flight starts with."""
+    force, info = sees.force, writes.allocator_info
+    tensions, directions = writes.desired_tensions, writes.desired_directions
     if not np.isfinite(force @ force):
         return Status.INVALID_FORCE
     weighted = params[:, None] * directions

@@ -145,9 +145,9 @@ def test_help_teaches() -> None:
 def test_an_allocator_in_a_file_of_ones_own_flies(tmp_path: Path) -> None:
     (tmp_path / "halves.py").write_text(
         "from colift.allocation.base import AllocatorPart\n"
-        "def share(force, acceleration, dt, params, memory, tensions, directions, info):\n"
-        "    tensions[:] = abs(force[2]) / len(tensions)\n"
-        "    directions[:] = (0.0, 0.0, -1.0)\n"
+        "def share(now, sees, params, memory, writes):\n"
+        "    writes.desired_tensions[:] = abs(sees.force[2]) / len(writes.desired_tensions)\n"
+        "    writes.desired_directions[:] = (0.0, 0.0, -1.0)\n"
         "    return 0\n"
         "class Halves(AllocatorPart):\n"
         "    kernel = share\n"

@@ -18,10 +18,11 @@ import os, signal
 from colift.allocation.base import AllocatorPart
 from colift.geometry import ring
 
-def solve(force, acceleration, dt, params, memory, tensions, directions, info):
+def solve(now, sees, params, memory, writes):
     "Calls back as a library does that takes any error of a callback for a failed evaluation."
     memory[0] += 1.0
-    tensions[:] = force[2] / len(tensions)
+    tensions = writes.desired_tensions
+    tensions[:] = sees.force[2] / len(tensions)
     if memory[0] == 20.0:
         try:
             os.kill(os.getpid(), signal.SIGINT)

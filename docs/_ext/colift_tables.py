@@ -1,6 +1,6 @@
 """Tables that are written by the package itself, so that the pages cannot go stale.
 
-Directives: ``signal-table``, ``recording-layout``, ``quantity-table``, ``metric-table``,
+Directives: ``port-table``, ``signal-table``, ``recording-layout``, ``quantity-table``, ``metric-table``,
 ``field-table`` (fields of one section of a mission) and ``part-tables`` (all parts of one layer).
 """
 
@@ -14,10 +14,11 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from colift.catalogue import DEFAULT_KINDS
+from colift.kernel.ports import PORTS
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, Signal
 from colift.metrics import all_metrics
 from colift.mission import Mission, schema
 from colift.part import FOLDERS, find, names
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Signal
 from colift.team import Team
 from colift.wording import meanings
 
@@ -92,7 +93,7 @@ def cell(content: str | nodes.Node) -> nodes.entry:
 
 WIDTHS = {
     "symbol": 10, "name": 24, "shape": 11, "unit": 11, "frame": 11, "meaning": 40, "default": 14,
-    "field": 16, "type": 14, "range": 15, "data set": 30, "metric": 30,
+    "field": 16, "layer": 14, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
 }  # fmt: skip
 
 
@@ -109,6 +110,20 @@ def table(head: list[str], rows: list[list[Any]]) -> nodes.table:
     result = nodes.table(classes=["colift"])
     result += group
     return result
+
+
+class PortTable(SphinxDirective):
+    """Which signals each layer sees and writes."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = [
+            [port.name.replace("_", " "), *map(self.names, (port.sees, port.writes))]
+            for port in PORTS.values()
+        ]
+        return [table(["layer", "sees", "writes"], rows)]
+
+    def names(self, signals: tuple[str, ...]) -> str:
+        return ", ".join(f"``{name}``" for name in signals) or "-"
 
 
 class SignalTable(SphinxDirective):
@@ -328,6 +343,7 @@ class PartTables(SphinxDirective):
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
+    app.add_directive("port-table", PortTable)
     app.add_directive("signal-table", SignalTable)
     app.add_directive("quantity-table", QuantityTable)
     app.add_directive("recording-layout", RecordingLayout)

@@ -15,8 +15,10 @@ from colift.jit import kernel
 
 
 @kernel(SIGNATURE)  # delete this line and the same code runs as plain Python
-def equal_share(force, acceleration, dt, params, memory, tensions, directions, info):
-    info[:] = 0.0
+def equal_share(now, sees, params, memory, writes):
+    force = sees.force
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    writes.allocator_info[:] = 0.0
     if not math.isfinite(force[0] + force[1] + force[2]):
         return 3  # colift.Status.INVALID_FORCE; the last answer stands
     n = tensions.shape[0]

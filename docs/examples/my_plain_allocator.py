@@ -5,7 +5,9 @@ import numpy as np
 from colift.allocation.base import AllocatorPart
 
 
-def equal_share(force, acceleration, dt, params, memory, tensions, directions, info):
+def equal_share(now, sees, params, memory, writes):
+    force = sees.force
+    tensions, directions = writes.desired_tensions, writes.desired_directions
     if not np.isfinite(force).all():
         return 3
     n = len(tensions)
@@ -16,7 +18,7 @@ def equal_share(force, acceleration, dt, params, memory, tensions, directions, i
     tensions[:] = np.linalg.norm(pulls, axis=1)
     taut = tensions > 0
     directions[taut] = pulls[taut] / tensions[taut, None]
-    info[:] = 0
+    writes.allocator_info[:] = 0
     return 0
 
 

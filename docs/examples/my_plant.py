@@ -17,20 +17,14 @@ rigid_step = RigidCables.kernel
 
 
 @kernel(STEP_SIGNATURE)
-def step(
-    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
-    catch_impulses, slack_times,
-):  # fmt: skip
-    n = thrusts.shape[0]
+def step(now, sees, params, memory, writes):
+    on_load = sees.external_forces[-1]
     drag = params[params.shape[0] - 1]
     for k in range(3):  # memory[3:6] is the velocity of the load
-        external[n, k] -= drag * memory[3 + k]
-    rigid_step(
-        thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
-        catch_impulses, slack_times,
-    )  # fmt: skip
+        on_load[k] -= drag * memory[3 + k]
+    rigid_step(now, sees, params, memory, writes)
     for k in range(3):
-        external[n, k] = 0.0
+        on_load[k] = 0.0
 
 
 class DraggyCables(RigidCables):

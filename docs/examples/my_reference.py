@@ -11,7 +11,8 @@ from colift.reference.base import SIGNATURE, ReferencePart
 
 
 @kernel(SIGNATURE)
-def bob(t, params, reference):
+def bob(now, sees, params, memory, writes):
+    t, reference = now.time, writes.reference
     height, amplitude, rate = params[0], params[1], params[2]
     reference[:] = 0.0
     # Starts at rest: 1 - cos, and its derivatives.

@@ -72,6 +72,17 @@ def _compile(kernel: Any, signature: Any) -> None:
     kernel.disable_compile()
 
 
+def address_of(kernel: Any) -> Any:
+    """Address of a kernel's machine code, by which other compiled code can call it as long as the kernel lives.
+
+    A kernel that is not compiled stands for itself.
+    """
+    if not hasattr(kernel, "overloads"):
+        return kernel
+    (made,) = kernel.overloads.values()
+    return int(made.library.get_pointer_to_function(made.fndesc.llvm_func_name))
+
+
 made: list[str] = []
 """Names of the kernels of this process, in the order in which they came."""
 

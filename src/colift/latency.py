@@ -26,14 +26,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numba import types
 
-from colift.allocation.base import INFO_ITERATIONS, INFO_SIZE, SIGNATURE, Allocator, AllocatorPart
+from colift.allocation.base import INFO_ITERATIONS, INFO_SIZE, Allocator, AllocatorPart, ask
 from colift.allocation.safe import Safe
 from colift.allocation.sqp import Sqp
 from colift.benchmark.machine import machine
 from colift.benchmark.problems import forces, scaled_problem
 from colift.errors import ColiftError
 from colift.geometry import Array, ring
-from colift.jit import f8, i8, kernel, matrix, monotonic_ns, thread_time_ns, vector, void
+from colift.jit import (
+    address_of,
+    f8,
+    i8,
+    kernel,
+    matrix,
+    monotonic_ns,
+    thread_time_ns,
+    vector,
+    void,
+)
 from colift.team import Team
 
 if TYPE_CHECKING:
@@ -59,7 +69,7 @@ _sleep_us = types.ExternalFunction("usleep", types.int32(types.uint32))
 
 @kernel(
     void(
-        types.FunctionType(SIGNATURE),
+        i8,
         matrix,
         f8,
         i8,
@@ -68,7 +78,7 @@ _sleep_us = types.ExternalFunction("usleep", types.int32(types.uint32))
         vector,
         matrix,
         vector,
-        vector,
+        matrix,
         matrix,
     )
 )
@@ -85,7 +95,7 @@ def _tick(  # type: ignore[no-untyped-def]
         while monotonic_ns() < tick:
             pass
         begin, cpu = monotonic_ns(), thread_time_ns()
-        allocate(forces[k], rest, dt, params, memory, tensions, directions, info)
+        ask(allocate, forces[k], rest, dt, params, memory, tensions, directions, info)
         own = thread_time_ns() - cpu
         wall = monotonic_ns() - begin
         out[k, 0] = begin - tick
@@ -102,7 +112,7 @@ def in_loop(part: AllocatorPart, team: Team, seconds: float, rate: float) -> Ite
     """Ticks from a compiled loop, a second at a time: (k, 5)."""
     params, memory = part.params(team), part.memory(team)
     directions, tensions = ring(team.n, np.radians(35.0)), np.zeros(team.n)
-    info, rest = np.zeros(INFO_SIZE), np.zeros(3)
+    info, rest = np.zeros(INFO_SIZE), np.zeros((4, 3))
     ticks = round(seconds * rate)
     path = forces(team.n, ticks, period=1.0 / rate)
     chunk = max(1, round(rate))
@@ -110,7 +120,7 @@ def in_loop(part: AllocatorPart, team: Team, seconds: float, rate: float) -> Ite
         some = np.ascontiguousarray(path[begin : begin + chunk])
         out = np.zeros((len(some), 5))
         _tick(
-            type(part).kernel, some, 1.0 / rate, round(1e9 / rate), params, memory, tensions,
+            address_of(type(part).kernel), some, 1.0 / rate, round(1e9 / rate), params, memory, tensions,
             directions, info, rest, out,
         )  # fmt: skip
         yield out

@@ -39,8 +39,8 @@ KIND = ("kind",)
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
-class _PartType(ModelMetaclass):
-    """Calling a part's class with settings that it refuses raises an error of ours."""
+class Refusing(ModelMetaclass):
+    """Calling such a class with settings that it refuses raises an error of ours."""
 
     def __call__(cls, *args: Any, **settings: Any) -> Any:  # noqa: N805
         try:
@@ -49,7 +49,7 @@ class _PartType(ModelMetaclass):
             raise SettingError(problems_of(error, cast(type[BaseModel], cls), settings)) from error
 
 
-class Part(BaseModel, metaclass=_PartType):
+class Part(BaseModel, metaclass=Refusing):
     """Settings of one implementation of one layer.
 
     A subclass declares its fields, names its ``kernel`` and packs the fields for it. Kernels may be
@@ -105,6 +105,47 @@ class Part(BaseModel, metaclass=_PartType):
         overrides this, mostly with :func:`carry_rows`.
         """
         return old if fresh.size == old.size else fresh
+
+    def call(
+        self,
+        team: Team,
+        memory: Vector,
+        *,
+        params: Vector | None = None,
+        step: int = 0,
+        time: float = 0.0,
+        dt: float = 1e-3,
+        key: int = 0,
+        **signals: Any,
+    ) -> Any:
+        """Call the kernel once, outside of any flight: to test a part by itself.
+
+        Parameters
+        ----------
+        team : Team
+            For the parameters and the sizes of the signals.
+        memory : array
+            What the kernel remembers; from :meth:`memory`.
+        params : array, optional
+            Instead of those for the team.
+        step, time, dt, key
+            What the kernel is told as :class:`colift.kernel.ports.Now`.
+        **signals
+            Those that the port of the layer names (:data:`colift.kernel.ports.PORTS`); contiguous arrays of floats that the
+            kernel writes are written in place. What is not given has its initial value.
+
+        Returns
+        -------
+        (writes, status)
+            The named tuple of the signals that the kernel writes, and what it returned.
+
+        """
+        from colift.kernel.ports import PORTS
+
+        port, own = PORTS[self.layer], self.params(team) if params is None else params
+        found = port.signals(team.n, **signals)
+        wire = port.wire(type(self).kernel, own, memory, found, key=int(key))
+        return wire.writes, port.invoke(wire, int(step), float(time), float(dt))
 
     @classmethod
     def missing(cls) -> str:

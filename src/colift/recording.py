@@ -34,8 +34,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.errors import AbsentSignalError, RecordingError
+from colift.kernel.signals import CYCLE_SIGNALS, LEGEND, SIGNALS, Signal
 from colift.mission.recorded import RecordedMission
-from colift.simulation.signals import CYCLE_SIGNALS, LEGEND, SIGNALS, Signal
 
 if TYPE_CHECKING:
     from colift.mission.mission import Mission

@@ -8,15 +8,14 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from colift.allocation._feasibility import spread_formation
 from colift.allocation._reach import out_of_reach
-from colift.allocation.base import INFO_SIZE, SIGNATURE, AllocatorPart, Status
+from colift.allocation.base import INFO_SIZE, AllocatorPart, Status, ask
 from colift.allocation.safe import Safe
 from colift.allocation.sqp import Sqp
 from colift.geometry import Array, pairwise_angles
-from colift.jit import f8, kernel, matrix, monotonic_ns, vector, void
+from colift.jit import address_of, f8, i8, kernel, matrix, monotonic_ns, vector, void
 from colift.math import shares
 from colift.runner import run
 from colift.team import Team
@@ -45,7 +44,7 @@ LEAST_ANGLES = {12: 25.0, 16: 25.0, 20: 22.0, 24: 20.0, 64: 11.0}
 
 @kernel(
     void(
-        types.FunctionType(SIGNATURE),
+        i8,
         matrix,
         matrix,
         f8,
@@ -55,17 +54,20 @@ LEAST_ANGLES = {12: 25.0, 16: 25.0, 20: 22.0, 24: 20.0, 64: 11.0}
         matrix,
         vector,
         matrix,
+        matrix,
     )
 )
 def _attack(  # type: ignore[no-untyped-def]
-    allocate, forces, accelerations, dt, params, memory, tensions, directions, info, out
+    allocate, forces, accelerations, dt, params, memory, tensions, directions, info, reference, out
 ):
     """Call an allocator once per force; a row of ``out``: status, ns, tensions (n), directions (3n)."""
     n = tensions.shape[0]
     for k in range(forces.shape[0]):
+        for m in range(3):
+            reference[2, m] = accelerations[k, m]
         begin = monotonic_ns()
-        out[k, 0] = allocate(
-            forces[k], accelerations[k], dt, params, memory, tensions, directions, info
+        out[k, 0] = ask(
+            allocate, forces[k], reference, dt, params, memory, tensions, directions, info
         )
         out[k, 1] = monotonic_ns() - begin
         for i in range(n):
@@ -197,8 +199,8 @@ def answers(
         out = np.zeros((len(forces), 2 + 4 * n))
         first = directions.copy()
         _attack(
-            type(part).kernel, forces, accelerations, period, params, memory, tensions, directions,
-            info, out,
+            address_of(type(part).kernel), forces, accelerations, period, params, memory, tensions, directions,
+            info, np.zeros((4, 3)), out,
         )  # fmt: skip
         alpha = out[:, 2 + n :].reshape(-1, n, 3)
         before = np.concatenate([first[None], alpha[:-1]])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
 
 from colift import part
-from colift.allocation.base import INFO_BALANCE, INFO_SIZE, Status
+from colift.allocation.base import INFO_BALANCE, INFO_SIZE, Status, ask
 from colift.geometry import ring
-from colift.jit import JIT_ENABLED
+from colift.jit import JIT_ENABLED, address_of
 from colift.team import Team
 
 KINDS = part.names("allocation")
@@ -55,23 +55,17 @@ class Cell:
     def __init__(self, kind: str, n: int) -> None:
         team = Team.uniform(n)
         found = part.find("allocation", kind)
-        settings_ = found()
-        self.kernel = found.kernel
-        self.arrays = (settings_.params(team), settings_.memory(team))
+        self.team, self.part = team, found()
+        self.memory = self.part.memory(team)
         self.tensions = np.zeros(n)
         self.directions = ring(n, np.radians(35.0))
         self.info = np.full(INFO_SIZE, 12345.0)
 
     def __call__(self, force) -> Status:
-        code = self.kernel(
-            np.array(force, dtype=float),
-            np.zeros(3),
-            0.01,
-            *self.arrays,
-            self.tensions,
-            self.directions,
-            self.info,
-        )
+        _, code = self.part.call(
+            self.team, self.memory, dt=0.01, force=force, desired_tensions=self.tensions,
+            desired_directions=self.directions, allocator_info=self.info,
+        )  # fmt: skip
         return Status(code)
 
     def check_usable(self) -> None:
@@ -190,32 +184,25 @@ def test_kernel_allocates_no_memory(kind):
         pytest.skip("a plain Python kernel")
 
     @numba.njit
-    def calls(count, forces, acceleration, params, memory, tensions, directions, info):
+    def calls(count, forces, address, reference, params, memory, tensions, directions, info):
         for k in range(count):
-            kernel(
-                forces[k % forces.shape[0]],
-                acceleration,
-                0.01,
-                params,
-                memory,
-                tensions,
-                directions,
-                info,
-            )
+            force = forces[k % forces.shape[0]]
+            ask(address, force, reference, 0.01, params, memory, tensions, directions, info)
 
     cell = Cell(kind, 4)
     noisy = GOOD + np.random.default_rng(0).normal(size=(64, 3))
     noisy[5] = np.nan
     noisy[6] = 0.0
     outputs = (cell.tensions, cell.directions, cell.info)
-    calls(1, noisy, np.zeros(3), *cell.arrays, *outputs)
+    bound = (address_of(kernel), np.zeros((4, 3)), cell.part.params(cell.team), cell.memory)
+    calls(1, noisy, *bound, *outputs)
     enabled = _nrt_python.memsys_stats_enabled()
     _nrt_python.memsys_enable_stats()
     try:
         counts = []
         for count in (1, 10_000):
             before = rtsys.get_allocation_stats()
-            calls(count, noisy, np.zeros(3), *cell.arrays, *outputs)
+            calls(count, noisy, *bound, *outputs)
             after = rtsys.get_allocation_stats()
             counts.append((after.alloc - before.alloc, after.mi_alloc - before.mi_alloc))
     finally:

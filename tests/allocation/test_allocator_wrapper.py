@@ -111,7 +111,7 @@ def test_a_force_without_three_components_is_refused_and_changes_nothing(flown, 
 def test_an_acceleration_left_out_is_zero_not_the_last_one(flown):
     flown.allocate(HOVER, [1.0, 2.0, 3.0])
     flown.allocate(HOVER)
-    assert (flown._acceleration == 0.0).all()
+    assert (flown._reference == 0.0).all()
 
 
 def test_reset_starts_again_bit_by_bit():

@@ -18,7 +18,7 @@ from colift.allocation.base import AllocatorPart
 
 class Mine(AllocatorPart):
     layer = "allocation"
-    def kernel(force, acceleration, dt, params, memory, tensions, directions, info):
+    def kernel(now, sees, params, memory, writes):
 """
 BODIES = {
     "slow": "time.sleep(0.02)",
@@ -28,8 +28,8 @@ BODIES = {
     "once": "mark = Path(__file__ + '.mark')\n{pad}mark.exists() or (mark.touch(), os._exit(7))",
 }
 REST = """
-        tensions[:] = abs(force[2]) / len(tensions)
-        directions[:] = (0.0, 0.0, -1.0)
+        writes.desired_tensions[:] = abs(sees.force[2]) / len(writes.desired_tensions)
+        writes.desired_directions[:] = (0.0, 0.0, -1.0)
         return 0
     kernel = staticmethod(kernel)
 """

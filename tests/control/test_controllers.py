@@ -86,11 +86,9 @@ def test_thrust_straight_down_is_guarded(near):
 
 
 def load_force(part, load, reference, *, memory=None, dt=0.01, team=None):
-    force = np.zeros(3)
     team = team or Team.uniform(4)
     memory = part.memory(team) if memory is None else memory
-    LoadPid.kernel(load, reference, dt, part.params(team), memory, force)
-    return force
+    return part.call(team, memory, dt=dt, estimated_load=load, reference=reference)[0].force
 
 
 def test_load_pid_without_error_carries_weight_and_acceleration():
@@ -169,14 +167,15 @@ class Drones:
         self.team = Team.uniform(n)
         self.part = PositionPid(**settings)
         self.memory = self.part.memory(self.team)
-        self.params = self.part.params(self.team)
         self.forces, self.thrusts = np.zeros((n, 3)), np.zeros(n)
         self.attitudes, self.rates = np.zeros((n, 4)), np.zeros((n, 3))
 
     def __call__(self, x, v, reference, T, alpha, dt=0.001):
-        PositionPid.kernel(
-            x, v, self.attitudes, self.rates, reference, T, alpha, dt, self.params, self.memory,
-            self.forces, self.thrusts, self.attitudes, self.rates,
+        self.part.call(
+            self.team, self.memory, dt=dt, estimated_positions=x, estimated_velocities=v,
+            estimated_attitudes=self.attitudes, estimated_rates=self.rates, reference=reference,
+            received_tensions=T, received_directions=alpha, drone_forces=self.forces,
+            thrusts=self.thrusts, desired_attitudes=self.attitudes, desired_rates=self.rates,
         )  # fmt: skip
         return self
 
@@ -289,10 +288,12 @@ def test_thrust_of_zero_or_straight_down_gives_finite_commands(acceleration):
 
 
 def torque(q, Omega, q_d, Omega_d, **settings):
-    part, team, tau = Manifold(**settings), Team.uniform(1), np.zeros((1, 3))
-    rows = [np.array([v], dtype=float) for v in (q, Omega, q_d, Omega_d)]
-    Manifold.kernel(*rows, 0.001, part.params(team), part.memory(team), tau)
-    return tau[0]
+    part, team = Manifold(**settings), Team.uniform(1)
+    writes, _ = part.call(
+        team, part.memory(team), estimated_attitudes=[q], estimated_rates=[Omega],
+        desired_attitudes=[q_d], desired_rates=[Omega_d],
+    )  # fmt: skip
+    return writes.torques[0]
 
 
 ONE = (1.0, 0.0, 0.0, 0.0)

@@ -27,6 +27,8 @@ HOVER = {
 }  # fmt: skip
 
 
+UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0]])
+
 # ---------------------------------------------------------------- the learned mass
 
 
@@ -34,7 +36,7 @@ HOVER = {
 def test_the_mass_of_the_load_is_learned(factor):
     flight = Flight(load_mission(HOVER, {"truth.load_mass_factor": factor}))
     flight.run()
-    learned = 1.0 + flight._legs[-1].memory.load_control[0]
+    learned = 1.0 + flight.wires.load_control.memory[0]
     assert learned == pytest.approx(factor, rel=0.02)
     error = flight.bus.load[0] - flight.bus.reference[0]
     assert np.linalg.norm(error) < 2e-3
@@ -42,12 +44,11 @@ def test_the_mass_of_the_load_is_learned(factor):
 
 def test_the_learned_mass_stays_in_its_bounds_whatever_happens():
     part, team = Adaptive(lower=0.6, upper=1.4), Team.uniform(4)
-    params, memory, force = part.params(team), part.memory(team), np.zeros(3)
-    reference = np.zeros((4, 3))
+    memory, force = part.memory(team), np.zeros(3)
     for direction, bound in ((-1.0, 1.4), (1.0, 0.6)):
         load = np.array([[0.3, -0.2, direction], [0.0, 0.0, 0.5 * direction]])
         for _ in range(20_000):  # a disturbance that never ends
-            type(part).kernel(load, reference, PERIOD, params, memory, force)
+            part.call(team, memory, dt=PERIOD, estimated_load=load, force=force)
         assert 1.0 + memory[0] == pytest.approx(bound)
         lean = math.hypot(force[0], force[1]) / force[2]
         assert lean <= math.tan(math.radians(part.max_lean_deg)) * (1.0 + 1e-12)
@@ -58,9 +59,10 @@ def test_without_an_error_the_law_is_weight_and_acceleration():
     part, team = Adaptive(), Team.uniform(4)
     force, reference = np.zeros(3), np.zeros((4, 3))
     reference[2] = [0.7, -0.4, 0.2]
-    type(part).kernel(
-        reference[:2].copy(), reference, PERIOD, part.params(team), part.memory(team), force
-    )
+    part.call(
+        team, part.memory(team), dt=PERIOD, estimated_load=reference[:2], reference=reference,
+        force=force,
+    )  # fmt: skip
     np.testing.assert_allclose(force, team.load_mass * (reference[2] + [0.0, 0.0, team.gravity]))
 
 
@@ -87,10 +89,9 @@ class Observed:
 
     def __init__(self, n: int, **settings: float) -> None:
         self.part, self.team = DisturbanceObserver(delay=0.0, **settings), Team.uniform(n)
-        self.params, self.memory = self.part.params(self.team), self.part.memory(self.team)
+        self.memory = self.part.memory(self.team)
         self.velocities = np.zeros((n, 3))
-        self.u, self.thrusts = np.zeros((n, 3)), np.zeros(n)
-        self.attitudes, self.rates = np.zeros((n, 4)), np.zeros((n, 3))
+        self.thrusts = np.zeros(n)
 
     def fly(self, axes: np.ndarray, pushes: np.ndarray, offset: float = 0.0) -> np.ndarray:
         """One period with thrust along ``axes`` and forces ``pushes`` (n, 3); the observed forces (n, 3)."""
@@ -101,10 +102,12 @@ class Observed:
         turn = 2.0 * np.pi * np.arange(n) / n
         alpha = np.stack([tilt * np.cos(turn), tilt * np.sin(turn), np.full(n, -height)], axis=1)
         places = -self.team.cable_lengths[:, None] * alpha + [offset, 0.0, 0.0]
-        type(self.part).kernel(
-            places, self.velocities, q, np.zeros((n, 3)), np.zeros((4, 3)), np.zeros(n), alpha, PERIOD,
-            self.params, self.memory, self.u, self.thrusts, self.attitudes, self.rates,
+        writes, _ = self.part.call(
+            self.team, self.memory, dt=PERIOD, estimated_positions=places,
+            estimated_velocities=self.velocities, estimated_attitudes=q, received_directions=alpha,
+            thrusts=self.thrusts,
         )  # fmt: skip
+        self.u = writes.drone_forces
         pull = self.thrusts[:, None] * axes - self.team.masses[:, None] * [0.0, 0.0, g]
         self.velocities += PERIOD * (pull + pushes) / self.team.masses[:, None]
         rows = self.memory.reshape(n, -1)
@@ -152,7 +155,7 @@ def test_an_attitude_is_turned_by_its_torques_while_the_rate_is_not_measured():
     ends = []
     for coast in (0.1, 0.0):
         part, team = DelayAware(delay=0.0, coast=coast), Team.uniform(1)
-        params, memory, tau = part.params(team), part.memory(team), np.zeros((1, 3))
+        memory, tau = part.memory(team), np.zeros((1, 3))
         angle, rate = 0.3, 0.0
         seen = (angle, rate)
         for k in range(30):
@@ -160,8 +163,10 @@ def test_an_attitude_is_turned_by_its_torques_while_the_rate_is_not_measured():
                 seen = (angle, rate)
             q = np.array([[np.cos(0.5 * seen[0]), np.sin(0.5 * seen[0]), 0.0, 0.0]])
             Omega = np.array([[seen[1], 0.0, 0.0]])
-            wanted = np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 3))
-            type(part).kernel(q, Omega, *wanted, PERIOD, params, memory, tau)
+            part.call(
+                team, memory, dt=PERIOD, estimated_attitudes=q, estimated_rates=Omega,
+                desired_attitudes=UPRIGHT, torques=tau,
+            )  # fmt: skip
             torque = tau[0, 0] / team.inertias[0, 0]
             angle += PERIOD * (rate + 0.5 * PERIOD * torque)
             rate += PERIOD * torque
@@ -176,13 +181,15 @@ def test_sampling_is_not_taken_for_silence():
     team, torques = Team.uniform(1), []
     for held in (1, 8):
         part = DelayAware(delay=0.02)
-        params, memory, tau = part.params(team), part.memory(team), np.zeros((1, 3))
+        memory, tau = part.memory(team), np.zeros((1, 3))
         for k in range(200):
             angle = 0.1 * np.sin(0.02 * k)
             q = np.array([[np.cos(0.5 * angle), np.sin(0.5 * angle), 0.0, 0.0]])
             Omega = np.array([[1e-9 * (k // held), 0.0, 0.0]])
-            wanted = np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 3))
-            type(part).kernel(q, Omega, *wanted, 1e-3, params, memory, tau)
+            part.call(
+                team, memory, estimated_attitudes=q, estimated_rates=Omega,
+                desired_attitudes=UPRIGHT, torques=tau,
+            )  # fmt: skip
         torques.append(tau[0, 0])
     assert torques[1] == pytest.approx(torques[0], rel=1e-6)
 
@@ -230,15 +237,17 @@ class Watched:
 
     def __init__(self, part: Predictor, late: int, n: int = 1) -> None:
         self.part, self.late, self.team = part, late, Team.uniform(n)
-        self.params, self.memory = part.params(self.team), part.memory(self.team)
+        self.memory = part.memory(self.team)
         self.out = [np.zeros((2, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 3))]  # fmt: skip
 
     def look(self, k, load, positions, velocities, thrusts, tensions, directions):
-        n = self.team.n
-        attitudes = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-        type(self.part).kernel(
-            k, 1e-3, load, positions, velocities, attitudes, np.zeros((n, 3)), thrusts, tensions,
-            directions, self.params, self.memory, *self.out,
+        names = ("load", "positions", "velocities", "attitudes", "rates")
+        estimated = {f"estimated_{n}": out for n, out in zip(names, self.out, strict=True)}
+        self.part.call(
+            self.team, self.memory, step=k, measured_load=load, measured_positions=positions,
+            measured_velocities=velocities, measured_attitudes=np.tile(UPRIGHT, (self.team.n, 1)),
+            thrusts=thrusts, received_tensions=tensions, received_directions=directions,
+            **estimated,
         )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ def turn(part: DelayAware, delay: float, seconds: float = 2.0, angle: float = 0.
     """Roll angle over time of one drone that sees its attitude late; physics at 1 ms, control at 10 ms."""
     team = Team.uniform(1)
     J, h, every = team.inertias[0, 0], 1e-3, 10
-    params, memory = part.params(team), part.memory(team)
+    memory = part.memory(team)
     roll, rate, late = 0.0, 0.0, round(delay / h)
     past, out = [(0.0, 0.0)] * (late + 1), []
     torque = np.zeros((1, 3))
@@ -76,9 +76,9 @@ def turn(part: DelayAware, delay: float, seconds: float = 2.0, angle: float = 0.
         seen, speed = past[-1 - late]
         if k % every == 0:
             q = np.array([[math.cos(0.5 * seen), math.sin(0.5 * seen), 0.0, 0.0]])
-            type(part).kernel(
-                q, np.array([[speed, 0.0, 0.0]]), wanted, np.zeros((1, 3)), every * h, params,
-                memory, torque,
+            part.call(
+                team, memory, dt=every * h, estimated_attitudes=q,
+                estimated_rates=[[speed, 0.0, 0.0]], desired_attitudes=wanted, torques=torque,
             )  # fmt: skip
         rate += h * torque[0, 0] / J
         roll += h * rate
@@ -107,15 +107,16 @@ def test_gains_that_know_nothing_of_the_delay_diverge():
 
 def test_torques_stay_within_what_rotors_can_do():
     part, team = DelayAware(), Team.uniform(3)
-    params, memory = part.params(team), part.memory(team)
+    memory = part.memory(team)
     rng, tau = np.random.default_rng(0), np.zeros((3, 3))
     fastest = [part.max_acceleration, part.max_acceleration, part.max_yaw_acceleration]
     most = team.inertias * fastest
     for _ in range(200):
         q = rng.normal(size=(2, 3, 4))
         q /= np.linalg.norm(q, axis=2, keepdims=True)
-        type(part).kernel(
-            q[0], rng.normal(size=(3, 3)) * 1e3, q[1], np.zeros((3, 3)), 0.01, params, memory, tau
-        )
+        part.call(
+            team, memory, dt=0.01, estimated_attitudes=q[0],
+            estimated_rates=rng.normal(size=(3, 3)) * 1e3, desired_attitudes=q[1], torques=tau,
+        )  # fmt: skip
         assert np.isfinite(tau).all()
         assert (np.abs(tau) <= most * (1.0 + 1e-9)).all()

@@ -89,7 +89,7 @@ def test_mu_reaches_the_running_allocator(start):
     hand = start("paper-spiral")
     hand.fly(0.5)
     hand.do(lambda s: s.turn("allocation.mu", 0.37))
-    assert hand.session.flight._legs[-1].params.allocation[0] == 0.37
+    assert hand.session.flight.wires.allocation.params[0] == 0.37
     assert hand.session.state["values"]["allocation.mu"] == 0.37
     assert hand.refusals == []
 

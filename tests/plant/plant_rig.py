@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from colift.kernel.ports import PORTS
 from colift.plant._bodies import BODY, DRONE, LOAD, MASS, state_size
 from colift.plant._chain import BEAD, CABLE
 from colift.plant.base import Start
@@ -13,9 +14,6 @@ from colift.team import Team
 E3 = np.array([0.0, 0.0, 1.0])
 DOWN = np.array([[0.0, 0.0, -1.0]])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-OBSERVED = (
-    "load", "positions", "velocities", "attitudes", "rates", "directions", "direction_rates",
-)  # fmt: skip
 
 
 def rotation(q):
@@ -57,19 +55,27 @@ class Rig:
         self.beads[:] = (1.0 - down) * self.drones[:, None, :BEAD] + down * self.load.ravel()
 
     def step(self, dt=0.001, count=1):
+        port = PORTS["plant"]
+        wire = port.wire(type(self.part).kernel, self.params, self.memory, self._signals())
         for _ in range(count):
-            type(self.part).kernel(
-                self.thrusts, self.torques, self.external, self.attached, dt, self.params,
-                self.memory, self.tensions, self.peak_tensions, self.catch_impulses,
-                self.slack_times,
-            )  # fmt: skip
+            port.invoke(wire, 0, 0.0, dt)
         return self
 
+    def _signals(self):
+        return {
+            "applied_thrusts": self.thrusts, "applied_torques": self.torques,
+            "external_forces": self.external, "attached": self.attached, "tensions": self.tensions,
+            "peak_tensions": self.peak_tensions, "catch_impulses": self.catch_impulses,
+            "slack_times": self.slack_times,
+        }  # fmt: skip
+
     def observe(self):
-        n = self.n
-        out = [np.zeros((2, 3)), *(np.zeros((n, k)) for k in (3, 3, 4, 3, 3, 3))]
-        type(self.part).observe(self.params, self.memory, *out)
-        return dict(zip(OBSERVED, out, strict=True))
+        port = PORTS["plant_observe"]
+        signals = port.signals(self.n)
+        port.invoke(
+            port.wire(type(self.part).observe, self.params, self.memory, signals), 0, 0.0, 1e-3
+        )
+        return signals
 
     def points(self):
         """Masses (N,), positions and velocities (N, 3) of everything that has mass."""

@@ -55,11 +55,11 @@ def test_a_section_in_an_event_is_the_same_as_its_settings_one_by_one():
 def test_a_part_of_the_same_kind_keeps_its_memory_another_forgets():
     flight = Flight(load_mission(TABLE))
     flight.advance(0.5)
-    memory = flight._legs[-1].memory.allocation.copy()
+    memory = flight.wires.allocation.memory.copy()
     flight.change("allocation", {"kind": "safe", "mu": 0.4})
     assert flight.parts["allocation"].mu == 0.4
-    np.testing.assert_array_equal(flight._legs[-1].memory.allocation, memory)
-    assert flight._legs[-1].params.allocation[0] == 0.4
+    np.testing.assert_array_equal(flight.wires.allocation.memory, memory)
+    assert flight.wires.allocation.params[0] == 0.4
     flight.change("allocation", {"kind": "sqp", "mu": 0.3})
     assert flight.parts["allocation"].mu == 0.3
     assert len(flight._legs) == 2

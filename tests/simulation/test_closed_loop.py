@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import colift
+from colift.kernel.signals import SIGNALS, columns, make_bus
 from colift.mission import load_mission
 from colift.simulation import flight as flight_module
 from colift.simulation.flight import Flight, start_state
-from colift.simulation.signals import SIGNALS, columns, make_bus
 
 G = 9.81
 
@@ -91,7 +91,7 @@ def test_controllers_are_told_their_period(monkeypatch):
         )  # fmt: skip
         flight = Flight(mission)
         flight.run()
-        errors.append(flight._legs[-1].memory.load_control[2])
+        errors.append(flight.wires.load_control.memory[2])
     assert errors[0] == pytest.approx(errors[1], rel=0.1)
     assert errors[0] > 1e-4
 
@@ -127,7 +127,7 @@ def test_several_events_hold_from_their_time_on():
     monitor = flight._advance
 
     def advance(stop):
-        seen.append((flight._step, flight._legs[-1].params.plant[0]))
+        seen.append((flight._step, flight.wires.plant.params[0]))
         monitor(stop)
 
     flight._advance = advance
@@ -278,4 +278,5 @@ def test_bus_holds_every_signal_once(n):
         view[...] = k
         assert (bus.row[where[signal.name]] == k).all()
     assert (covered == 1).all()
-    assert list(bus._fields) == ["row", *(signal.name for signal in SIGNALS)]
+    names = ["row", "allocator_info", *(signal.name for signal in SIGNALS)]
+    assert list(bus._fields) == names

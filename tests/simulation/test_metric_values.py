@@ -10,9 +10,9 @@ import pytest
 import colift
 from colift import metrics
 from colift.geometry import ring
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.mission import load_mission
 from colift.recording import Recording
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
 
 
 def synthetic(n=4, duration=20.0, period=0.01):

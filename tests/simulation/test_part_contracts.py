@@ -13,18 +13,25 @@ from numba.core.runtime import _nrt_python, rtsys
 import colift
 from colift import jit, part
 from colift.allocation import base as allocation
-from colift.disturbance import base as disturbance
 from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.fault.base import LOAD
+from colift.kernel.ports import PORTS
+from colift.kernel.signals import CONDITIONS
 from colift.mission import load_mission
 from colift.plant.base import Start
 from colift.simulation.flight import Flight
-from colift.simulation.loop import KERNEL_SIGNATURES
-from colift.simulation.signals import CONDITIONS
+from colift.simulation.loop import FUNCTIONS
 from colift.team import Team
 from colift.wording import meanings
 
-SIGNATURES = {**KERNEL_SIGNATURES, "disturbance": {"kernel": disturbance.SIGNATURE}}
+SIGNATURES = {
+    layer: {
+        function: PORTS[port].signature
+        for port, (of, function) in {**FUNCTIONS, "disturbance": ("disturbance", "kernel")}.items()
+        if of == layer
+    }
+    for layer in (*part.LAYERS, "disturbance")
+}
 EVERY = [(layer, name) for layer in (*part.LAYERS, "disturbance") for name in part.names(layer)]
 FAULTS = part.names("fault")
 IDS = [f"{layer}/{name}" for layer, name in EVERY]
@@ -40,7 +47,8 @@ def mission_with(layer, name, **overrides):
 
 
 def test_every_folder_has_a_part():
-    assert tuple(KERNEL_SIGNATURES) == part.LAYERS
+    assert set(PORTS) == {*FUNCTIONS, "disturbance"}
+    assert {layer for layer, _ in FUNCTIONS.values()} == set(part.LAYERS)
     assert {layer for layer, _ in EVERY} | {"fault"} == set(part.FOLDERS)
     assert FAULTS
 
@@ -205,8 +213,10 @@ def test_names_do_not_compile_anything():
 # ---------------------------------------------------------------- plain Python parts
 
 
-def share_evenly(force, acceleration, dt, params, memory, tensions, directions, info):
+def share_evenly(now, sees, params, memory, writes):
     """A ring about the vertical that leans by the force: equal cables, written without NumPy calls."""
+    force, info = sees.force, writes.allocator_info
+    tensions, directions = writes.desired_tensions, writes.desired_directions
     n = tensions.shape[0]
     memory[0] += 1.0
     for k in range(3):
@@ -288,9 +298,9 @@ def test_a_users_file_registers_its_parts(tmp_path, monkeypatch):
     path = tmp_path / "my_hover.py"
     path.write_text(
         "from colift.reference.base import ReferencePart\n"
-        "def kernel(t, params, reference):\n"
-        "    reference[:] = 0.0\n"
-        "    reference[0, 2] = 2.0\n"
+        "def kernel(now, sees, params, memory, writes):\n"
+        "    writes.reference[:] = 0.0\n"
+        "    writes.reference[0, 2] = 2.0\n"
         "class MyHover(ReferencePart):\n"
         "    '''Two metres up.'''\n"
         "    kernel = kernel\n"

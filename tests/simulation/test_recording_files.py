@@ -10,8 +10,8 @@ import pytest
 
 import colift
 from colift.errors import RecordingError
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.recording import Recording, atomic_path
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
 
 
 @pytest.fixture(scope="module")

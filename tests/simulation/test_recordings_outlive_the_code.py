@@ -22,11 +22,11 @@ import pytest
 
 from colift import metrics
 from colift.errors import AbsentSignalError, RecordingError
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.moments import find_moments
 from colift.recording import Recording
 from colift.report.figures import drawable
 from colift.report.html import write_report
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
 from colift.verdict import judge
 from colift.viewer.data import payload
 

@@ -15,7 +15,7 @@ class Air:
 
     def __init__(self, part, n=1, *, key=7, dt=0.001):
         self.part, self.n, self.key, self.dt = part, n, key, dt
-        self.params, self.memory = part.params(Team.uniform(n)), part.memory(Team.uniform(n))
+        self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
         self.load = np.zeros((2, 3))
         self.positions = np.tile([0.0, 0.0, 1.0], (n, 1))
         self.velocities, self.attitudes = np.zeros((n, 3)), np.tile(UPRIGHT, (n, 1))
@@ -28,10 +28,10 @@ class Air:
         self.directions[:] = between / np.linalg.norm(between, axis=1, keepdims=True)
 
     def act(self, step=0, wind=(0.0, 0.0, 0.0)):
-        air, forces = np.array(wind, dtype=float), np.zeros((self.n + 1, 3))
-        type(self.part).kernel(
-            step, self.key, self.dt, self.load, self.positions, self.velocities, self.attitudes,
-            self.directions, self.direction_rates, self.thrusts, self.attached, self.params,
-            self.memory, air, forces,
+        writes, _ = self.part.call(
+            self.team, self.memory, step=step, dt=self.dt, key=self.key, load=self.load,
+            positions=self.positions, velocities=self.velocities, attitudes=self.attitudes,
+            directions=self.directions, direction_rates=self.direction_rates,
+            applied_thrusts=self.thrusts, attached=self.attached, wind=np.array(wind, dtype=float),
         )  # fmt: skip
-        return air, forces
+        return writes.wind, writes.external_forces

@@ -41,14 +41,11 @@ def test_motors():
     """Within rounding: thrust less command is the noise alone."""
     part, histories = Motors(noise=0.05), []
     for dt in STEPS:
-        memory, params = part.memory(Team.uniform(2)), part.params(Team.uniform(2))
-        rows, thrusts, torques, saturated = [], np.zeros(2), np.zeros((2, 3)), np.zeros(2)
+        team = Team.uniform(2)
+        memory, rows = part.memory(team), []
         for k in range(round(1.0 / dt) + 1):
-            Motors.kernel(
-                k, 5, dt, np.full(2, 6.0), np.zeros((2, 3)), np.ones((2, 4)), params, memory,
-                thrusts, torques, saturated,
-            )  # fmt: skip
-            rows.append([*thrusts, *torques.ravel()])
+            acting, _ = part.call(team, memory, step=k, key=5, dt=dt, thrusts=np.full(2, 6.0))
+            rows.append([*acting.applied_thrusts, *acting.applied_torques.ravel()])
         histories.append(np.array(rows)[:: round(0.01 / dt)])
     assert histories[0][:, 0].std() > 0.05
     for other in histories[1:]:
@@ -63,14 +60,13 @@ def test_sensors():
     )
     n, histories = 2, []
     for dt in STEPS:
-        memory, params = part.memory(Team.uniform(n)), part.params(Team.uniform(n))
-        shapes = [(2, 3), (n, 3), (n, 3), (n, 4), (n, 3)]
-        truth, measured = [np.zeros(s) for s in shapes], [np.zeros(s) for s in shapes]
-        truth[3][:, 0] = 1.0
-        rows = []
+        team, rows = Team.uniform(n), []
+        memory, measured = part.memory(team), {}
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
         for k in range(round(1.0 / dt) + 1):
-            Noisy.kernel(k, 11, dt, *truth, np.zeros(n + 1), params, memory, *measured)
-            rows.append(np.concatenate([m.ravel() for m in measured]))
+            read, _ = part.call(team, memory, step=k, key=11, dt=dt, attitudes=upright, **measured)
+            measured = read._asdict()
+            rows.append(np.concatenate([m.ravel() for m in read]))
         histories.append(np.array(rows)[:: round(0.01 / dt)])
     # Delays of 7 and 1 ms are no multiples of 2 ms: they are rounded to 8 and 2 ms, before the next row.
     for other in histories[1:]:
@@ -81,11 +77,13 @@ def test_sensors():
 def test_radio():
     part, histories = Radio(period=0.01, delay=0.002, jitter=0.004, loss=0.3), []
     for dt in STEPS:
-        memory, params = part.memory(Team.uniform(2)), part.params(Team.uniform(2))
-        rows, tensions, directions = [], np.zeros(2), np.zeros((2, 3))
+        team, rows, tensions = Team.uniform(2), [], np.zeros(2)
+        memory = part.memory(team)
         for k in range(round(1.0 / dt) + 1):
-            wanted = np.full(2, k * dt)
-            Radio.kernel(k, 3, dt, wanted, np.zeros((2, 3)), params, memory, tensions, directions)
+            part.call(
+                team, memory, step=k, key=3, dt=dt, desired_tensions=np.full(2, k * dt),
+                received_tensions=tensions,
+            )  # fmt: skip
             rows.append(tensions.copy())
         histories.append(np.array(rows)[:: round(0.01 / dt)])
     lost = np.diff(histories[0], axis=0) == 0.0

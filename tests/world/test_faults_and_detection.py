@@ -13,11 +13,11 @@ from colift.errors import MissionError
 from colift.fault.base import LOAD
 from colift.fault.battery_low import BatteryLow
 from colift.fault.motor_degraded import MotorDegraded
+from colift.kernel.signals import CYCLE_SIGNALS
 from colift.metrics import compute
 from colift.mission import load_mission
 from colift.reference.descent import Descent
 from colift.simulation.flight import Flight
-from colift.simulation.signals import CYCLE_SIGNALS
 
 AT = 3.0
 REAL = ["ideal", "real"]
@@ -285,15 +285,15 @@ def test_thresholds_are_settings():
 def alarms(distances, dt=0.005):
     """Whether a drone above its load is judged lost as the distance between them takes these values."""
     part, team = Residuals(), colift.team.Team.uniform(1)
-    params, memory, carrying = part.params(team), part.memory(team), np.ones(1)
+    memory, carrying = part.memory(team), np.ones(1)
     down, q = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
     found = []
     for d, speed in zip(distances, np.gradient(distances, dt), strict=True):
         load = np.array([[0.0, 0.0, -d], [0.0, 0.0, -speed]])
         hover = np.array([team.masses[0] * team.gravity])
-        Residuals.kernel(
-            dt, load, np.zeros((1, 3)), np.zeros((1, 3)), q, hover, np.zeros(1), down, params,
-            memory, carrying,
+        part.call(
+            team, memory, dt=dt, estimated_load=load, estimated_attitudes=q, thrusts=hover,
+            received_directions=down, carrying=carrying,
         )  # fmt: skip
         found.append(carrying[0] == 0.0)
     return np.array(found)
@@ -339,7 +339,7 @@ class Hovering:
         self.attitudes = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
         self.load, self.velocities = np.zeros((2, 3)), np.zeros((n, 3))
         self.positions = -self.directions
-        self.params, self.memory = self.part.params(self.team), self.part.memory(self.team)
+        self.memory = self.part.memory(self.team)
         self.carrying = np.ones(n)
 
     def fly(self, duration, forces=None, moving=True):
@@ -349,9 +349,12 @@ class Hovering:
                 self.velocities += self.DT / self.m * forces
             if moving:
                 self.positions += self.DT * self.velocities
-            Residuals.kernel(
-                self.DT, self.load, self.positions, self.velocities, self.attitudes, self.thrusts,
-                self.tensions, self.directions, self.params, self.memory, self.carrying,
+            self.part.call(
+                self.team, self.memory, dt=self.DT, estimated_load=self.load,
+                estimated_positions=self.positions, estimated_velocities=self.velocities,
+                estimated_attitudes=self.attitudes, thrusts=self.thrusts,
+                received_tensions=self.tensions, received_directions=self.directions,
+                carrying=self.carrying,
             )  # fmt: skip
             assert np.isfinite(self.memory).all()
             if not self.carrying.all():

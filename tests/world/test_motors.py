@@ -40,18 +40,17 @@ class Rotors:
 
     def __init__(self, part, n=1, *, dt=0.001, key=5):
         self.part, self.n, self.dt, self.key = part, n, dt, key
-        self.params, self.memory = part.params(Team.uniform(n)), part.memory(Team.uniform(n))
+        self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
         self.health = np.ones((n, 4))
         self.saturated_times = np.zeros(n)
 
     def act(self, f, tau=(0.0, 0.0, 0.0), step=0):
-        thrusts, torques = np.zeros(self.n), np.zeros((self.n, 3))
-        type(self.part).kernel(
-            step, self.key, self.dt, np.full(self.n, float(f)), np.tile(tau, (self.n, 1)) * 1.0,
-            self.health, self.params, self.memory, thrusts, torques,
-            self.saturated_times,
+        acting, _ = self.part.call(
+            self.team, self.memory, step=step, key=self.key, dt=self.dt,
+            thrusts=np.full(self.n, float(f)), torques=np.tile(tau, (self.n, 1)),
+            motor_health=self.health, saturated_times=self.saturated_times,
         )  # fmt: skip
-        return np.column_stack([thrusts, torques])
+        return np.column_stack([acting.applied_thrusts, acting.applied_torques])
 
 
 @settings(deadline=None)

@@ -30,16 +30,18 @@ class Sensors:
 
     def __init__(self, part, n=2, *, key=11, dt=0.001):
         self.part, self.key, self.dt = part, key, dt
-        self.params, self.memory = part.params(Team.uniform(n)), part.memory(Team.uniform(n))
+        self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
         shapes = [(2, 3), (n, 3), (n, 3), (n, 4), (n, 3)]
         self.truth, self.measured = [np.zeros(s) for s in shapes], [np.zeros(s) for s in shapes]
         self.truth[3][:, 0] = 1.0
         self.stuck = np.zeros(n + 1)
 
     def read(self, step):
-        type(self.part).kernel(
-            step, self.key, self.dt, *self.truth, self.stuck, self.params, self.memory,
-            *self.measured,
+        truth = dict(zip(NAMES, self.truth, strict=True))
+        measured = {f"measured_{n}": m for n, m in zip(NAMES, self.measured, strict=True)}
+        self.part.call(
+            self.team, self.memory, step=step, dt=self.dt, key=self.key, stuck=self.stuck, **truth,
+            **measured,
         )  # fmt: skip
         return dict(zip(NAMES, (m.copy() for m in self.measured), strict=True))
 
@@ -191,7 +193,7 @@ class Link:
 
     def __init__(self, part, n=1, *, key=3):
         self.part, self.n, self.key = part, n, key
-        self.params, self.memory = part.params(Team.uniform(n)), part.memory(Team.uniform(n))
+        self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
         self.tensions, self.directions = np.zeros(n), np.zeros((n, 3))
 
     def count(self, steps):
@@ -199,9 +201,10 @@ class Link:
         rows = []
         for k in range(steps):
             wanted = np.full(self.n, float(k))
-            type(self.part).kernel(
-                k, self.key, 0.001, wanted, np.repeat(wanted, 3).reshape(-1, 3), self.params,
-                self.memory, self.tensions, self.directions,
+            self.part.call(
+                self.team, self.memory, step=k, key=self.key, desired_tensions=wanted,
+                desired_directions=np.repeat(wanted, 3).reshape(-1, 3),
+                received_tensions=self.tensions, received_directions=self.directions,
             )  # fmt: skip
             assert_array_equal(self.directions[:, 2], self.tensions)
             rows.append(self.tensions.copy())

@@ -8,28 +8,17 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from colift.allocation._hover import thrusts_of
-from colift.jit import f8, i8, matrix, vector, void
+from colift.kernel.ports import PORTS
 from colift.part import Part, Vector
 from colift.team import Team
 
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
 
-SIGNATURE = void(i8, i8, f8, vector, matrix, matrix, vector, vector, vector, matrix, vector)
-"""``kernel(step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts,
-applied_torques, saturated_times)``, called each physics step.
+SIGNATURE = PORTS["actuation"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-================  ======  ==============================================================
-step              int     number of the physics step
-key               int     of this part's random numbers (:mod:`colift.math.noise`)
-dt                float   physics step, s
-thrusts           (n,)    commands, along the body z axes, N
-torques           (n, 3)  commands, body frame, N m
-motor_health      (n, 4)  share of its thrust that each motor still gives, 0 to 1
-applied_thrusts   (n,)    out: N
-applied_torques   (n, 3)  out: body frame, N m
-saturated_times   (n,)    in/out: time in which each drone's motors could not give what was commanded, s
-================  ======  ==============================================================
+Called each physics step. ``saturated_times`` grow while a drone's motors cannot give what was commanded.
 """
 
 

@@ -7,10 +7,9 @@ from colift.jit import kernel
 
 
 @kernel(SIGNATURE)
-def _act(  # type: ignore[no-untyped-def]
-    step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts, applied_torques,
-    saturated_times,
-):  # fmt: skip
+def _act(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    thrusts, torques, motor_health = sees.thrusts, sees.torques, sees.motor_health
+    applied_thrusts, applied_torques = writes.applied_thrusts, writes.applied_torques
     for i in range(thrusts.shape[0]):
         health = 0.25 * (
             motor_health[i, 0] + motor_health[i, 1] + motor_health[i, 2] + motor_health[i, 3]

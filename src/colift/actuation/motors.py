@@ -65,10 +65,11 @@ def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[n
 
 
 @kernel(SIGNATURE)
-def _turn(  # type: ignore[no-untyped-def]
-    step, key, dt, thrusts, torques, motor_health, params, memory, applied_thrusts, applied_torques,
-    saturated_times,
-):  # fmt: skip
+def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, key, dt = now.step, now.key, now.dt
+    thrusts, torques, motor_health = sees.thrusts, sees.torques, sees.motor_health
+    applied_thrusts, applied_torques = writes.applied_thrusts, writes.applied_torques
+    saturated_times = writes.saturated_times
     n = thrusts.shape[0]
     lever, ratio, lag, rate = params[0], params[1], params[2], params[3]
     keep = math.exp(-dt / lag) if lag > 0.0 else 0.0

@@ -21,8 +21,11 @@ _CLAMPED = int(Status.CLAMPED)
 
 
 @kernel(SIGNATURE)
-def allocate_fixed(force, acceleration, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def allocate_fixed(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     """Turn the pattern from the vertical to the force; scale its shares by the force's size."""
+    force = sees.force
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    info = writes.allocator_info
     n = tensions.shape[0]
     W = begin(force, tensions, info)
     if not math.isfinite(W):

@@ -78,9 +78,9 @@ def plain_kernel(solve: Callable[[Problem], Outcome]) -> Callable[..., int]:
     (``NUMERICAL_FAILURE``).
     """
 
-    def kernel(  # type: ignore[no-untyped-def]
-        force, acceleration, dt, params, memory, tensions, directions, info
-    ) -> int:
+    def kernel(now, sees, params, memory, writes) -> int:  # type: ignore[no-untyped-def]
+        force, dt, info = sees.force, now.dt, writes.allocator_info
+        tensions, directions = writes.desired_tensions, writes.desired_directions
         W = begin(force, tensions, info)
         if not math.isfinite(W):
             return int(Status.INVALID_FORCE)

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from colift.allocation._status import Status as Status
 from colift.errors import Problem, SettingError
 from colift.geometry import Array, ring, widest_gap
-from colift.jit import f8, i8, matrix, vector
+from colift.jit import address_of, f8, i8, inline, kernel, matrix, vector
+from colift.kernel.ports import PORTS, Wire
 from colift.part import Part, Vector
 from colift.team import Team
 from colift.wording import numbers, shown
@@ -26,22 +27,29 @@ if TYPE_CHECKING:
     from colift.actuation.base import ActuationPart
     from colift.mission.mission import Mission
 
-SIGNATURE = i8(vector, vector, f8, vector, vector, vector, matrix, vector)
-"""``kernel(force, acceleration, dt, params, memory, tensions, directions, info) -> status``.
+SIGNATURE = PORTS["allocation"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-============  ========  ==================================================================
-force         (3,)      wanted total force of the cables on the load, world, N
-acceleration  (3,)      wanted acceleration of the load, world, m/s^2
-dt            float     time since the last call, s
-params        (p,)      from :meth:`AllocatorPart.params`
-memory        (m,)      from :meth:`AllocatorPart.memory`; owned by the kernel
-tensions      (n,)      out: wanted tensions, N
-directions    (n, 3)    out: wanted unit directions from drone to load, world
-info          (6,)      out: see ``INFO_*``
-============  ========  ==================================================================
-
-On entry ``tensions`` and ``directions`` hold the last answer, or the start formation.
+Returns a :class:`Status` as an integer. Called at the layer's own period, ``now.dt``. ``reference[2]`` is the wanted acceleration of
+the load. What it writes holds the last answer on entry, or the start formation; ``allocator_info`` has the places ``INFO_*``.
 """
+
+_Sees, _Writes = PORTS["allocation"].Sees, PORTS["allocation"].Writes
+_invoke = PORTS["allocation"].invoke
+
+
+@inline
+def ask(address, force, reference, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+    """Call an allocator's kernel, from compiled code of studies and benchmarks, by its address."""
+    sees, writes = _Sees(force, reference), _Writes(tensions, directions, info)
+    return _invoke(Wire(address, 0, params, memory, sees, writes), 0, 0.0, dt)
+
+
+@kernel(i8(i8, vector, matrix, f8, vector, vector, vector, matrix, vector))
+def _ask(address, force, reference, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+    """:func:`ask` from Python, to which plain arrays are quicker than named tuples of them."""
+    return ask(address, force, reference, dt, params, memory, tensions, directions, info)
+
 
 INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
 INFO_SIZE = 6
@@ -226,9 +234,11 @@ class Allocator:
         self._cone = math.radians(float(numbers("cone_deg", cone_deg, (), above=0.0, below=180.0)))
         if problems := part.wrong_lengths(self._whole.n):
             raise SettingError([Problem(name, "", message) for name, message in problems])
-        self._kernel = type(part).kernel  # through the class: no binding as a method
+        kernel = type(part).kernel  # through the class: no binding as a method
+        self._function = address_of(kernel)
+        self._ask = _ask if self._function is not kernel else getattr(ask, "py_func", ask)
         self._force = np.zeros(3)
-        self._acceleration = np.zeros(3)
+        self._reference = np.zeros((4, 3))
         self._info = np.zeros(INFO_SIZE)
         self._bind(range(self._whole.n))
         self.reset()
@@ -406,11 +416,12 @@ class Allocator:
             )
             numbers("dt", self.dt if dt is None else dt, (), finite=False)
         self._force[:] = wanted
-        self._acceleration[:] = motion
+        self._reference[2] = motion
         start = perf_counter()
-        status = self._kernel(
+        status = self._ask(
+            self._function,
             self._force,
-            self._acceleration,
+            self._reference,
             period,
             self._params,
             self._memory,

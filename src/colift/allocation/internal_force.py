@@ -21,8 +21,12 @@ _INVALID_FORCE = int(Status.INVALID_FORCE)
 
 
 @kernel(SIGNATURE)
-def _allocate(force, acceleration, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     """Cable forces on the load ``F/n + t_L d_i``; the spread ``d`` follows its aim and adds up to 0."""
+    dt = now.dt
+    force = sees.force
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    info = writes.allocator_info
     n = tensions.shape[0]
     internal, settling = params[0], params[1]
     W = begin(force, tensions, info)

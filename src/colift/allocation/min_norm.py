@@ -65,7 +65,10 @@ def _pseudo_inverse(formation, inverse):  # type: ignore[no-untyped-def]
 
 
 @kernel(SIGNATURE)
-def _allocate(force, acceleration, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    force = sees.force
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    info = writes.allocator_info
     n = tensions.shape[0]
     formation = memory[1 : 1 + 3 * n].reshape(n, 3)
     inverse = memory[1 + 3 * n :].reshape(n, 3)

@@ -44,7 +44,11 @@ _RECOVERING = int(Status.RECOVERING)
 
 
 @kernel(SIGNATURE)
-def _allocate(force, acceleration, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    force, acceleration = sees.force, sees.reference[2]
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    info = writes.allocator_info
     n = tensions.shape[0]
     most = n * (n - 1) // 2
     count = newton.LIMITS * n + most

@@ -35,7 +35,10 @@ _HEAD = 8  # memory: |F| of the last answer, its unit force (3), multiplier lam 
 
 
 @kernel(SIGNATURE)
-def _allocate(force, acceleration, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    force = sees.force
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    info = writes.allocator_info
     n = tensions.shape[0]
     mu = params[0]
     transport = params[3] != 0.0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from colift.jit import f8, matrix, vector, void
+from colift.kernel.ports import PORTS
 from colift.part import Part, Vector
 from colift.team import Team
 from colift.tuning import loop_growth
@@ -15,17 +15,10 @@ from colift.tuning import loop_growth
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
 
-SIGNATURE = void(matrix, matrix, matrix, matrix, f8, vector, vector, matrix)
-"""``kernel(attitudes, rates, wanted_attitudes, wanted_rates, dt, params, memory, torques)``.
+SIGNATURE = PORTS["attitude_control"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-=================  ======  ==================================================
-attitudes          (n, 4)  of the drones, wxyz, body to world
-rates              (n, 3)  body rates, body frame, rad/s
-wanted_attitudes   (n, 4)  wxyz
-wanted_rates       (n, 3)  body frame, rad/s
-dt                 float   control period, s
-torques            (n, 3)  out: torque commands, body frame, N m
-=================  ======  ==================================================
+Called at the layer's own period, ``now.dt``.
 """
 
 

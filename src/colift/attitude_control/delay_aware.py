@@ -43,7 +43,11 @@ def _spin(params, c, tx, ty, tz, p, q, r):  # type: ignore[no-untyped-def]
 
 
 @kernel(SIGNATURE)
-def _delay_aware(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: ignore[no-untyped-def]
+def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    q, Omega, q_d = sees.estimated_attitudes, sees.estimated_rates, sees.desired_attitudes
+    Omega_d = sees.desired_rates
+    tau = writes.torques
     n = q.shape[0]
     past = min(int((params[0] + params[_COAST]) / dt + 1e-9) + 1, _MOST - 1)
     keep = math.exp(-dt / params[1]) if params[1] > 0.0 else 0.0

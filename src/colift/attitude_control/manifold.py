@@ -17,7 +17,10 @@ Gain = Annotated[float, Field(gt=0.0)]
 
 
 @kernel(SIGNATURE)
-def _manifold(q, Omega, q_d, Omega_d, dt, params, memory, tau):  # type: ignore[no-untyped-def]
+def _manifold(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    q, Omega, q_d = sees.estimated_attitudes, sees.estimated_rates, sees.desired_attitudes
+    Omega_d = sees.desired_rates
+    tau = writes.torques
     rho = params[0:3]
     K_d = params[3:6]
     beta = params[6:9]

@@ -14,10 +14,10 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from colift.allocation.base import INFO_SIZE, SIGNATURE
+from colift.allocation.base import INFO_SIZE, ask
 from colift.benchmark.instructions import CALLS, WARM_UP, cases
 from colift.benchmark.problems import Problem
-from colift.jit import f8, kernel, matrix, vector, void
+from colift.jit import address_of, f8, i8, kernel, matrix, vector, void
 
 binding.initialize_native_asmparser()
 
@@ -51,7 +51,7 @@ _dump, _zero, _start, _stop = map(_request, (0, 1, 4, 5))
 
 @kernel(
     void(
-        types.FunctionType(SIGNATURE), matrix, f8, vector, vector, vector, matrix, vector, vector
+        i8, matrix, f8, vector, vector, vector, matrix, vector, matrix
     )
 )  # fmt: skip
 def _counted(  # type: ignore[no-untyped-def]
@@ -62,7 +62,7 @@ def _counted(  # type: ignore[no-untyped-def]
         if k == WARM_UP:
             _start()
             _zero()
-        allocate(forces[k], rest, dt, params, memory, tensions, directions, info)
+        ask(allocate, forces[k], rest, dt, params, memory, tensions, directions, info)
     _dump()
     _stop()
 
@@ -74,7 +74,7 @@ def work(sizes: Sequence[int]) -> None:
         tensions, directions = problem.start
         part = problem.own
         _counted(
-            type(part).kernel, problem.forces(WARM_UP + CALLS, family), problem.period,
+            address_of(type(part).kernel), problem.forces(WARM_UP + CALLS, family), problem.period,
             part.params(problem.team), part.memory(problem.team), tensions, directions,
-            np.zeros(INFO_SIZE), np.zeros(3),
+            np.zeros(INFO_SIZE), np.zeros((4, 3)),
         )  # fmt: skip

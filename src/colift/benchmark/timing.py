@@ -11,15 +11,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
-from colift.allocation.base import INFO_SIZE, SIGNATURE, AllocatorPart
+from colift.allocation.base import INFO_SIZE, AllocatorPart, ask
 from colift.benchmark.problems import Family, Problem
 from colift.benchmark.referee import Verdict, judge
 from colift.benchmark.solvers import Called, Entrant, General
 from colift.geometry import Array
-from colift.jit import f8, i8, kernel, matrix, monotonic_ns, thread_time_ns, vector
+from colift.jit import address_of, f8, i8, kernel, matrix, monotonic_ns, thread_time_ns, vector
 
 LONGEST_TURN = 200
 """Most calls in one turn."""
@@ -37,7 +36,7 @@ FEWEST = 3
 
 @kernel(
     i8(
-        types.FunctionType(SIGNATURE),
+        i8,
         matrix,
         f8,
         vector,
@@ -45,7 +44,7 @@ FEWEST = 3
         vector,
         matrix,
         vector,
-        vector,
+        matrix,
         matrix,
     )
 )
@@ -60,7 +59,7 @@ def _time_calls(  # type: ignore[no-untyped-def]
     cpu = thread_time_ns()
     for k in range(forces.shape[0]):
         begin = monotonic_ns()
-        status = allocate(forces[k], rest, dt, params, memory, tensions, directions, info)
+        status = ask(allocate, forces[k], rest, dt, params, memory, tensions, directions, info)
         out[k, 0] = monotonic_ns() - begin
         out[k, 1] = info[0]
         out[k, 2] = status
@@ -90,10 +89,10 @@ class Compiled:
 
     def __init__(self, part: AllocatorPart, problem: Problem) -> None:
         tensions, directions = problem.start
-        self._kernel, self._dt = type(part).kernel, problem.period
+        self._kernel, self._dt = address_of(type(part).kernel), problem.period
         self._state = (
             part.params(problem.team), part.memory(problem.team), tensions.copy(),
-            directions.copy(), np.zeros(INFO_SIZE), np.zeros(3),
+            directions.copy(), np.zeros(INFO_SIZE), np.zeros((4, 3)),
         )  # fmt: skip
 
     def turn(self, forces: Array) -> Turn:

@@ -63,17 +63,16 @@ def import_(
       colift import cf2_01 cf7_01 --load-mass 0.0098 --out window.h5
       colift import px4.csv --frame ned --time-unit us
     """
-    from pydantic import ValidationError
-
     from colift import metrics
+    from colift.errors import SettingError
     from colift.importing import Assumed, Reading, import_flight
 
     try:
         assumed = Assumed(load_mass=load_mass, drone_mass=drone_mass, cable_length=cable_length)
-    except ValidationError as error:
-        first = error.errors()[0]
-        option = f"--{first['loc'][0]}".replace("_", "-")
-        raise typer.BadParameter(f"{option}: {first['msg']}; found {first['input']}") from None
+    except SettingError as error:
+        first = error.problems[0]
+        option = f"--{first.path}".replace("_", "-")
+        raise typer.BadParameter(f"{option}: {first.message} (found {first.value})") from None
     told = Reading(frame=frame, unit=unit, time_unit=time_unit, quaternion=quaternion)
     recording = import_flight(files, assumed, name=name, told=told)
     path = recording.save(target or Path(f"{files[0].stem}.h5"))

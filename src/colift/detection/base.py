@@ -4,27 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from colift.jit import f8, matrix, vector, void
+from colift.kernel.ports import PORTS
 from colift.part import Part
 
-SIGNATURE = void(f8, matrix, matrix, matrix, matrix, vector, vector, matrix, vector, vector, vector)
-"""``kernel(dt, load, positions, velocities, attitudes, thrusts, tensions, directions, params, memory,
-carrying)``, called at the period of the position controllers.
+SIGNATURE = PORTS["detection"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-==========  ======  ==================================================================
-dt          float   period, s
-load        (2, 3)  measured or estimated position (m) and velocity (m/s), world
-positions   (n, 3)  of the drones, as above
-velocities  (n, 3)  of the drones, as above
-attitudes   (n, 4)  wxyz, as above
-thrusts     (n,)    commands, N
-tensions    (n,)    wanted of the drones, N
-directions  (n, 3)  wanted, unit, from drone to load, world
-carrying    (n,)    in/out: 1; set to 0 for a drone that is judged lost to the load
-==========  ======  ==================================================================
-
-A drone judged lost leaves the team at once: the others share the load anew, and its cable is released
-if it still holds.
+Called at the period of the position controllers. Set ``carrying`` to 0 for a drone that is judged lost to the load: it leaves
+the team at once, the others share the load anew, and its cable is released if it still holds.
 """
 
 

@@ -7,19 +7,7 @@ from colift.jit import kernel
 
 
 @kernel(SIGNATURE)
-def _trust(  # type: ignore[no-untyped-def]
-    dt,
-    load,
-    positions,
-    velocities,
-    attitudes,
-    thrusts,
-    tensions,
-    directions,
-    params,
-    memory,
-    carrying,
-):
+def _trust(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     pass
 
 

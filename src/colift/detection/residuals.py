@@ -48,10 +48,12 @@ def _lacking(i, axis, windy, across, along, memory):  # type: ignore[no-untyped-
 
 
 @kernel(SIGNATURE)
-def _judge(  # type: ignore[no-untyped-def]
-    dt, load, positions, velocities, attitudes, thrusts, tensions, directions, params, memory,
-    carrying,
-):  # fmt: skip
+def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    load, positions = sees.estimated_load, sees.estimated_positions
+    velocities, attitudes = sees.estimated_velocities, sees.estimated_attitudes
+    thrusts, tensions = sees.thrusts, sees.received_tensions
+    carrying = writes.carrying
     n = positions.shape[0]
     tau, hold, fast, longer = params[0], params[1], params[2], params[3]
     learn, deficit, frozen, g = params[4], params[5], params[6], params[7]

@@ -73,10 +73,11 @@ def _depth_and_off(x, y, z, px, py, pz, ax, ay, az):  # type: ignore[no-untyped-
 
 
 @kernel(SIGNATURE)
-def _wash(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
-    attached, params, memory, wind, external,
-):  # fmt: skip
+def _wash(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    attitudes, directions, thrusts = sees.attitudes, sees.directions, sees.applied_thrusts
+    attached = sees.attached
+    wind, external = writes.wind, writes.external_forces
     n = positions.shape[0]
     half_rho, radius = 0.5 * params[0], 2.0 * params[1]  # four rotors as one disc
     drone, body, cable = half_rho * params[2], half_rho * params[3], half_rho * params[4]

@@ -33,10 +33,11 @@ def _on_body(velocity, wind, quadratic, linear, force):  # type: ignore[no-untyp
 
 
 @kernel(SIGNATURE)
-def _drag(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
-    attached, params, memory, wind, external,
-):  # fmt: skip
+def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    attitudes, directions, thrusts = sees.attitudes, sees.directions, sees.applied_thrusts
+    attached = sees.attached
+    wind, external = writes.wind, writes.external_forces
     n = positions.shape[0]
     half_rho = 0.5 * params[0]
     _on_body(load[1], wind, half_rho * params[3], params[4], external[n])

@@ -59,10 +59,10 @@ def second_order(memory, o, x, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel(SIGNATURE)
-def _dryden(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
-    attached, params, memory, wind, external,
-):  # fmt: skip
+def _dryden(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, key, dt = now.step, now.key, now.dt
+    load = sees.load
+    wind = writes.wind
     # memory: 1 + tick (0: not started); u; p and q of v; p and q of w; each for unit standard deviation
     L_u, L_w, sigma_u, sigma_w = scales(load[0, 2], params[0])
     now = noise.tick(step, dt)

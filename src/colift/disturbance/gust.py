@@ -18,10 +18,9 @@ Speed = Annotated[float, Field(ge=-60.0, le=60.0)]
 
 
 @kernel(SIGNATURE)
-def _gust(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
-    attached, params, memory, wind, external,
-):  # fmt: skip
+def _gust(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, key, dt = now.step, now.key, now.dt
+    wind = writes.wind
     since = step * dt - params[3]
     duration, interval = params[4], params[5]
     size = 1.0

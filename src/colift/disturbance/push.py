@@ -16,10 +16,10 @@ Newton = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 @kernel(SIGNATURE)
-def _push(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
-    attached, params, memory, wind, external,
-):  # fmt: skip
+def _push(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, dt = now.step, now.dt
+    positions = sees.positions
+    external = writes.external_forces
     t = step * dt
     if params[3] <= t < params[4]:
         for k in range(3):

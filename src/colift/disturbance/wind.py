@@ -18,10 +18,9 @@ Speed = Annotated[float, Field(ge=-60.0, le=60.0)]
 
 
 @kernel(SIGNATURE)
-def _blow(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, directions, direction_rates, thrusts,
-    attached, params, memory, wind, external,
-):  # fmt: skip
+def _blow(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, dt = now.step, now.dt
+    wind = writes.wind
     t = step * dt
     share = 1.0
     if t < params[3]:

@@ -7,11 +7,13 @@ from colift.jit import kernel
 
 
 @kernel(SIGNATURE)
-def _believe(  # type: ignore[no-untyped-def]
-    step, dt, load, positions, velocities, attitudes, rates, thrusts, tensions, directions, params,
-    memory, estimated_load, estimated_positions, estimated_velocities, estimated_attitudes,
-    estimated_rates,
-):  # fmt: skip
+def _believe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions = sees.measured_load, sees.measured_positions
+    velocities, attitudes = sees.measured_velocities, sees.measured_attitudes
+    rates = sees.measured_rates
+    estimated_load, estimated_positions = writes.estimated_load, writes.estimated_positions
+    estimated_velocities = writes.estimated_velocities
+    estimated_attitudes, estimated_rates = writes.estimated_attitudes, writes.estimated_rates
     for k in range(2):
         for m in range(3):
             estimated_load[k, m] = load[k, m]

@@ -133,11 +133,15 @@ def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-un
 
 
 @kernel(SIGNATURE)
-def _predict(  # type: ignore[no-untyped-def]
-    step, dt, load, positions, velocities, attitudes, rates, thrusts, tensions, directions, params,
-    memory, estimated_load, estimated_positions, estimated_velocities, estimated_attitudes,
-    estimated_rates,
-):  # fmt: skip
+def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, dt = now.step, now.dt
+    load, positions = sees.measured_load, sees.measured_positions
+    velocities, attitudes = sees.measured_velocities, sees.measured_attitudes
+    rates, thrusts, tensions = sees.measured_rates, sees.thrusts, sees.received_tensions
+    directions = sees.received_directions
+    estimated_load, estimated_positions = writes.estimated_load, writes.estimated_positions
+    estimated_velocities = writes.estimated_velocities
+    estimated_attitudes, estimated_rates = writes.estimated_attitudes, writes.estimated_rates
     n = positions.shape[0]
     # Steps finer than the ring are taken several at once.
     width = memory.size // (n + 1)

@@ -20,7 +20,7 @@ LOAD = -1
 class Change(NamedTuple):
     """``signal[drone] = value`` at a time (s); without a drone the whole signal.
 
-    ``signal`` is one of those of :data:`colift.simulation.signals.CONDITIONS`. In a value with several
+    ``signal`` is one of those of :data:`colift.kernel.signals.CONDITIONS`. In a value with several
     numbers, None leaves the one in its place as it is.
     """
 

@@ -15,9 +15,10 @@ from colift.errors import FlightDataError
 from colift.importing._clocks import merge
 from colift.importing._plausible import LONGEST, clean, doubt
 from colift.importing.base import Array, Log, Reading, read
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.mission.schema import Drones, Load, RealFlight, Section, Start, Timing
+from colift.part import Refusing
 from colift.recording import Recording, versions
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS
 
 CRAZYFLIE_INERTIA = (16.571710e-6, 16.655602e-6, 29.261652e-6)
 """kg m^2: J. Förster, System Identification of the Crazyflie 2.0 Nano Quadrocopter, ETH Zurich, 2015."""
@@ -25,7 +26,7 @@ CRAZYFLIE_INERTIA = (16.571710e-6, 16.655602e-6, 29.261652e-6)
 Mass = Annotated[float, Field(gt=0.0, le=1e5)]
 
 
-class Assumed(Section):
+class Assumed(Section, metaclass=Refusing):
     """What a log does not tell. The defaults are those of the published Crazyflie flights."""
 
     load_mass: Mass = 0.01

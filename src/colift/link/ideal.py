@@ -7,9 +7,9 @@ from colift.link.base import SIGNATURE, LinkPart
 
 
 @kernel(SIGNATURE)
-def _pass(  # type: ignore[no-untyped-def]
-    step, key, dt, tensions, directions, params, memory, received_tensions, received_directions
-):
+def _pass(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    tensions, directions = sees.desired_tensions, sees.desired_directions
+    received_tensions, received_directions = writes.received_tensions, writes.received_directions
     for i in range(tensions.shape[0]):
         received_tensions[i] = tensions[i]
         for k in range(3):

@@ -22,9 +22,10 @@ _WIDTH = 4  # numbers in a packet: tension, direction
 
 
 @kernel(SIGNATURE)
-def _transmit(  # type: ignore[no-untyped-def]
-    step, key, dt, tensions, directions, params, memory, received_tensions, received_directions
-):
+def _transmit(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, key, dt = now.step, now.key, now.dt
+    tensions, directions = sees.desired_tensions, sees.desired_directions
+    received_tensions, received_directions = writes.received_tensions, writes.received_directions
     slots = int(params[3])
     row = 1 + fifo.size(slots, _WIDTH)
     every = max(1, int(params[0] / dt + 0.5))

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from colift.kernel.signals import LEGEND
 from colift.live import protocol
 from colift.live.session import Row, Session
-from colift.simulation.signals import LEGEND
 from colift.verdict import limits
 
 PER_DRONE = {

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 
 @kernel(SIGNATURE)
-def _adaptive(load, reference, dt, params, memory, u_L):  # type: ignore[no-untyped-def]
+def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    load, reference = sees.estimated_load, sees.reference
+    u_L = writes.force
     m, g, k_p, k_d, k_i = params[0], params[1], params[2], params[3], params[4]
     learn, slope, lower, upper = params[5], params[6], params[7], params[8]
     tangent = params[9]

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from colift.jit import f8, matrix, vector, void
+from colift.kernel.ports import PORTS
 from colift.part import Part
 
-SIGNATURE = void(matrix, matrix, f8, vector, vector, vector)
-"""``kernel(load, reference, dt, params, memory, force)``, all in the world frame.
+SIGNATURE = PORTS["load_control"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-=========  ======  ==============================================================
-load       (2, 3)  position (m) and velocity (m/s) of the load
-reference  (4, 3)  wanted position, velocity, acceleration, jerk
-dt         float   control period, s
-force      (3,)    out: total force that the cables should exert on the load, N
-=========  ======  ==============================================================
+Called at the layer's own period, ``now.dt``.
 """
 
 

@@ -16,7 +16,10 @@ Gain = Annotated[float, Field(ge=0.0)]
 
 
 @kernel(SIGNATURE)
-def _pid(load, reference, dt, params, memory, u_L):  # type: ignore[no-untyped-def]
+def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    load, reference = sees.estimated_load, sees.reference
+    u_L = writes.force
     # u_L = m_L (g e3 + xdd_d) - k_p e - k_d edot - k_i int e
     m_L = params[0]
     g = params[1]

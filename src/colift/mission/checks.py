@@ -14,10 +14,10 @@ from colift.allocation._hover import hover_conflicts
 from colift.allocation.base import AllocatorPart
 from colift.errors import Problem, UnknownNameError
 from colift.fault.base import FaultPart
+from colift.kernel.signals import columns
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Part, find, kind_of
 from colift.simulation.loop import MAX_DISTURBANCES
-from colift.simulation.signals import columns
 from colift.wording import parse, problems_of, shown
 
 MAX_RECORDING = 4e9

@@ -124,9 +124,10 @@ def catch_impulse(i, parting, params):  # type: ignore[no-untyped-def]
 
 
 @kernel(OBSERVE_SIGNATURE)
-def observe(  # type: ignore[no-untyped-def]
-    params, memory, load, positions, velocities, attitudes, rates, directions, direction_rates
-):
+def observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions, velocities = writes.load, writes.positions, writes.velocities
+    attitudes, rates, directions = writes.attitudes, writes.rates, writes.directions
+    direction_rates = writes.direction_rates
     y = memory
     for k in range(3):
         load[0, k] = y[k]

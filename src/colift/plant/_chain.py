@@ -161,10 +161,12 @@ def note_catches(n, y, attached, T, params, parting, catch_impulses):  # type: i
 
 
 @kernel(STEP_SIGNATURE)
-def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
-    catch_impulses, slack_times,
-):  # fmt: skip
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions = writes.tensions, writes.peak_tensions
+    catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
     n = thrusts.shape[0]
     k, longest = int(params[params.shape[0] - 1]), params[params.shape[0] - 2]
     size = LOAD + DRONE * n + BEAD * k * n

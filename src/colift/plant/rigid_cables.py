@@ -24,10 +24,11 @@ from colift.team import Team
 
 
 @kernel(STEP_SIGNATURE)
-def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
-    catch_impulses, slack_times,
-):  # fmt: skip
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions, slack_times = writes.tensions, writes.peak_tensions, writes.slack_times
     n = thrusts.shape[0]
     size = LOAD + DRONE * n
     y = memory[:size]

@@ -108,10 +108,12 @@ def catch(n, y, attached, slow, params, taut, held, T, alpha, b, catch_impulses)
 
 
 @kernel(STEP_SIGNATURE)
-def _step(  # type: ignore[no-untyped-def]
-    thrusts, torques, external, attached, dt, params, memory, tensions, peak_tensions,
-    catch_impulses, slack_times,
-):  # fmt: skip
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions = writes.tensions, writes.peak_tensions
+    catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
     n = thrusts.shape[0]
     size = LOAD + DRONE * n
     y = memory[:size]

@@ -104,9 +104,13 @@ def _common_wind(n, params, memory):  # type: ignore[no-untyped-def]
 
 
 @kernel(SIGNATURE)
-def _observe_and_control(  # type: ignore[no-untyped-def]
-    x, v, q, Omega, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
-):
+def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    x, v, q = sees.estimated_positions, sees.estimated_velocities, sees.estimated_attitudes
+    Omega, reference, T = sees.estimated_rates, sees.reference, sees.received_tensions
+    alpha = sees.received_directions
+    u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
+    rates = writes.desired_rates
     n = x.shape[0]
     g = params[0]
     lag = math.exp(-dt / params[5]) if params[5] > 0.0 else 0.0

@@ -22,9 +22,12 @@ _SLOTS = 19  # memory per drone: started; integral; direction, rate, acceleratio
 
 
 @kernel(SIGNATURE)
-def _feed_forward(  # type: ignore[no-untyped-def]
-    x, v, q, Omega, reference, T, alpha, dt, params, memory, u, thrusts, attitudes, rates
-):
+def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    x, v, reference = sees.estimated_positions, sees.estimated_velocities, sees.reference
+    T, alpha = sees.received_tensions, sees.received_directions
+    u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
+    rates = writes.desired_rates
     n = x.shape[0]
     g = params[0]
     limit = params[10]

@@ -6,15 +6,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from colift.jit import f8, matrix, vector, void
+from colift.kernel.ports import PORTS
 from colift.part import Part, Vector
 from colift.team import Team
 
-SIGNATURE = void(f8, vector, matrix)
-"""``kernel(t, params, reference)``: time in s, ``reference`` (4, 3) out, world frame.
+SIGNATURE = PORTS["reference"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-Rows: position (m), velocity (m/s), acceleration (m/s^2), jerk (m/s^3), each the time derivative of
-the row above.
+The four rows of ``reference`` are position, velocity, acceleration and jerk, each the time derivative of the row above, at
+``now.time``. A reference remembers nothing: its memory is empty.
 """
 
 
@@ -25,8 +25,9 @@ class ReferencePart(Part):
 
     def sample(self, times: Vector, team: Team | None = None) -> Vector:
         """Reference at the given times: (len(times), 4, 3)."""
-        params = self.params(team or Team.uniform(1))
+        port, params = PORTS["reference"], self.params(team or Team.uniform(1))
         out = np.zeros((len(times), 4, 3))
         for row, t in zip(out, times, strict=True):
-            type(self).kernel(float(t), params, row)
+            wire = port.wire(type(self).kernel, params, np.zeros(0), {"reference": row})
+            port.invoke(wire, 0, float(t), 0.0)
         return out

@@ -17,7 +17,9 @@ Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 @kernel(SIGNATURE)
-def _descent(t, params, reference):  # type: ignore[no-untyped-def]
+def _descent(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    t = now.time
+    reference = writes.reference
     since, rate, ease, sink = t - params[6], params[7], params[8], params[9]
     begun = phase(since, ease, 1.0)
     ended = phase(since - sink, ease, 1.0)

@@ -16,7 +16,9 @@ from colift.team import Team
 
 
 @kernel(SIGNATURE)
-def _figure_eight(t, params, reference):  # type: ignore[no-untyped-def]
+def _figure_eight(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    t = now.time
+    reference = writes.reference
     p0, p1, p2, p3 = phase(t, params[6], params[5])
     x = sinusoid(params[3], 1.0, p0, p1, p2, p3, math.sin(p0), math.cos(p0))
     y = sinusoid(params[4], 2.0, p0, p1, p2, p3, math.sin(2.0 * p0), math.cos(2.0 * p0))

@@ -23,7 +23,9 @@ _SAMPLES = np.linspace(0.0, 1.0, 33)
 
 
 @kernel(SIGNATURE)
-def _guided(t, params, reference):  # type: ignore[no-untyped-def]
+def _guided(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    t = now.time
+    reference = writes.reference
     duration = params[1]
     elapsed = max(t - params[0], 0.0)
     s = min(elapsed / duration, 1.0)

@@ -11,7 +11,8 @@ from colift.team import Team
 
 
 @kernel(SIGNATURE)
-def _hover(t, params, reference):  # type: ignore[no-untyped-def]
+def _hover(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    reference = writes.reference
     for k in range(3):
         reference[0, k] = params[k]
         reference[1, k] = 0.0

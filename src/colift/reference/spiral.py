@@ -16,7 +16,9 @@ from colift.team import Team
 
 
 @kernel(SIGNATURE)
-def _spiral(t, params, reference):  # type: ignore[no-untyped-def]
+def _spiral(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    t = now.time
+    reference = writes.reference
     radius, rate, climb_rate, ramp = params[3], params[4], params[5], params[6]
     p0, p1, p2, p3 = phase(t, ramp, rate)
     s, c = math.sin(p0), math.cos(p0)

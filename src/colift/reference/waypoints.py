@@ -15,7 +15,9 @@ from colift.team import Team
 
 
 @kernel(SIGNATURE)
-def _waypoints(t, params, reference):  # type: ignore[no-untyped-def]
+def _waypoints(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    t = now.time
+    reference = writes.reference
     count = params.shape[0] // 5  # rows: departure time, travel time, position
     leg = 0
     while leg < count - 1 and t >= params[5 * (leg + 1)]:

@@ -4,28 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from colift.jit import f8, i8, matrix, vector, void
+from colift.kernel.ports import PORTS
 from colift.part import Part
 
-SIGNATURE = void(
-    i8, i8, f8, matrix, matrix, matrix, matrix, matrix, vector, vector, vector, matrix, matrix,
-    matrix, matrix, matrix,
-)  # fmt: skip
-"""``kernel(step, key, dt, load, positions, velocities, attitudes, rates, stuck, params, memory,
-measured_load, measured_positions, measured_velocities, measured_attitudes, measured_rates)``.
+SIGNATURE = PORTS["sensing"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-==========  ==========  ==================================================================
-step        int         number of the physics step
-key         int         of this part's random numbers (:mod:`colift.math.noise`)
-dt          float       physics step, s
-load        (2, 3)      true position (m) and velocity (m/s), world
-positions   (n, 3)      true, of the drones, world, m
-velocities  (n, 3)      true, world, m/s
-attitudes   (n, 4)      true, wxyz, body to world
-rates       (n, 3)      true body rates, body frame, rad/s
-stuck       (n + 1,)    1 where the sensors of a drone or, last, the load repeat their last value
-measured_*  as above    in/out: what the controllers are told; on entry, what they were told last
-==========  ==========  ==================================================================
+Called each physics step.
 """
 
 

@@ -7,10 +7,12 @@ from colift.sensing.base import SIGNATURE, SensingPart
 
 
 @kernel(SIGNATURE)
-def _sense(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, rates, stuck, params, memory,
-    measured_load, measured_positions, measured_velocities, measured_attitudes, measured_rates,
-):  # fmt: skip
+def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    attitudes, rates, stuck = sees.attitudes, sees.rates, sees.stuck
+    measured_load, measured_positions = writes.measured_load, writes.measured_positions
+    measured_velocities, measured_attitudes = writes.measured_velocities, writes.measured_attitudes
+    measured_rates = writes.measured_rates
     n = positions.shape[0]
     if stuck[n] == 0.0:
         for k in range(2):

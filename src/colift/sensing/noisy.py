@@ -78,10 +78,13 @@ def _draw_biases(memory, o, width, key, channel, params, quantity):  # type: ign
 
 
 @kernel(SIGNATURE)
-def _sense(  # type: ignore[no-untyped-def]
-    step, key, dt, load, positions, velocities, attitudes, rates, stuck, params, memory,
-    measured_load, measured_positions, measured_velocities, measured_attitudes, measured_rates,
-):  # fmt: skip
+def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    step, key, dt = now.step, now.key, now.dt
+    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    attitudes, rates, stuck = sees.attitudes, sees.rates, sees.stuck
+    measured_load, measured_positions = writes.measured_load, writes.measured_positions
+    measured_velocities, measured_attitudes = writes.measured_velocities, writes.measured_attitudes
+    measured_rates = writes.measured_rates
     n = positions.shape[0]
     # Load, then each drone: started; biases (6 or 12); queues. A drone's noise is body i + 1's.
     fresh = memory[0] == 0.0

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.actuation.base import ActuationPart
-from colift.allocation.base import INFO_SIZE, AllocatorPart
+from colift.allocation.base import AllocatorPart
 from colift.disturbance.base import DisturbancePart
 from colift.errors import ColiftError, Problem, SettingError
 from colift.fault.base import LOAD, Change
 from colift.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.interrupts import heard
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
 from colift.mission.schema import Event
 from colift.mission.warnings import warnings_of
@@ -28,18 +29,7 @@ from colift.part import LAYERS, Part, Vector, make
 from colift.plant.base import Start
 from colift.recording import Recording
 from colift.reference.descent import Descent
-from colift.simulation.loop import (
-    CYCLE_WIDTH,
-    Disturbances,
-    Keys,
-    Periods,
-    Vectors,
-    advance,
-    disturbance_kernel,
-    is_compiled,
-    kernels_of,
-)
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus, columns, make_bus
+from colift.simulation.loop import CYCLE_WIDTH, Circuit, Periods, advance, circuit
 from colift.team import Team
 from colift.wording import numbers
 
@@ -79,8 +69,7 @@ class Flight:
         self.descent = ""
         self._step = 0
         self._every = Periods(mission.timing.step, **mission.timing.multiples())
-        self._keys = Keys(*(random_key(mission.seed, layer) for layer in Keys._fields))
-        self._info = np.zeros(INFO_SIZE)
+        self._keys = {layer: random_key(mission.seed, layer) for layer in LAYERS}
         self._parts: dict[str, Part] = {layer: getattr(mission, layer) for layer in LAYERS}
         winds_first = sorted(
             enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
@@ -109,12 +98,17 @@ class Flight:
     @property
     def compiled(self) -> bool:
         """Whether every part is compiled, and so the loop."""
-        return self._legs[-1].compiled
+        return self._legs[-1].circuit.compiled
 
     @property
-    def bus(self) -> Bus:
+    def bus(self) -> Any:
         """All signals now, of the drones that fly (:attr:`drones`)."""
         return self._legs[-1].bus
+
+    @property
+    def wires(self) -> Any:
+        """The kernel of each layer with its parameters and memory, by layer (:class:`~colift.simulation.loop.Wires`)."""
+        return self._legs[-1].circuit.wires
 
     @property
     def drones(self) -> list[int]:
@@ -168,7 +162,9 @@ class Flight:
         if path == "load.mass":
             leg = self._legs[-1]
             self._load_mass = float(numbers("load.mass", value, (), above=0.0))
-            leg.params.plant[:] = self.mission.plant.params(self._true_team(leg.drones))
+            leg.circuit.wires.plant.params[:] = self.mission.plant.params(
+                self._true_team(leg.drones)
+            )
         elif path == "allocation.kind":
             self.replace("allocation", make("allocation", {"kind": value}))
         elif path in self.parts:
@@ -198,14 +194,15 @@ class Flight:
             assert isinstance(part, DisturbancePart)
             number = int(section.partition(".")[2])
             place = list(self._disturbances).index(number)
-            _refill(leg.disturbances.params[place], packed, section)
+            _refill(leg.circuit.disturbances[place].params, packed, section)
             self._disturbances[number] = part
         elif section == "plant":
             raise ColiftError("plant: cannot change in flight")
         elif same:
-            if part.memory(leg.team).shape != getattr(leg.memory, section).shape:
+            wire = getattr(leg.circuit.wires, section)
+            if part.memory(leg.team).shape != wire.memory.shape:
                 raise ColiftError(f"{section}: cannot change like this in flight")
-            _refill(getattr(leg.params, section), packed, section)
+            _refill(wire.params, packed, section)
             self._parts[section] = part
         else:
             self._parts[section] = part
@@ -234,7 +231,9 @@ class Flight:
         memory = {
             layer: fresh
             if layer in (anew or ())
-            else self._parts[layer].carry_over(getattr(old.memory, layer), fresh, places)
+            else self._parts[layer].carry_over(
+                getattr(old.circuit.wires, layer).memory, fresh, places
+            )
             for layer, fresh in self._fresh_memory(team, start).items()
         }
         self._begin_leg(drones, memory)
@@ -289,7 +288,7 @@ class Flight:
         """What is recorded in a second of flight."""
         every = self._every
         row, cycle = self.bus.row.size / every.recording, CYCLE_WIDTH / every.allocation
-        return 8.0 * (row + cycle) / every.step
+        return float(8.0 * (row + cycle) / every.step)
 
     @property
     def last_allocations(self) -> NDArray[np.float64]:
@@ -345,14 +344,11 @@ class Flight:
     def _advance(self, stop: int) -> None:
         """Run the loop up to a step, or until it ends early; keep what it recorded."""
         leg, every = self._legs[-1], self._every
-        loop: Any = advance if leg.compiled else getattr(advance, "py_func", advance)
+        loop: Any = advance if leg.circuit.compiled else getattr(advance, "py_func", advance)
         log = np.zeros((_due_rows(self._step, stop, every.recording), leg.bus.row.size))
         cycles = np.zeros((_due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
         begin = time.perf_counter()
-        reached = loop(
-            self._step, stop, every, self._keys, *leg.kernels, *leg.disturbances.arguments(),
-            leg.params, leg.memory, self._info, leg.bus, log, cycles,
-        )  # fmt: skip
+        reached = loop(self._step, stop, every, *leg.circuit.arguments(), log, cycles)
         self.loop_time += time.perf_counter() - begin
         log = log[: _due_rows(self._step, reached, every.recording)]
         cycles = cycles[: _due_rows(self._step, reached, every.allocation)]
@@ -392,27 +388,17 @@ class Flight:
         for place, (number, part) in enumerate(self._disturbances.items()):
             remembered = part.memory(team)
             if old is not None:
-                before = old.disturbances.memory[place]
+                before = old.circuit.disturbances[place].memory
                 remembered = part.carry_over(before, remembered, _places(old.drones, drones))
             key = random_key(self.mission.seed, f"disturbance.{number}")
             packed = part.of(drones).params(team)
-            disturbances.append((disturbance_kernel(type(part)), key, packed, remembered))
-        kernels = kernels_of({layer: type(part) for layer, part in self._parts.items()})
+            disturbances.append((type(part), key, packed, remembered))
         params = {layer: self._parts[layer].of(drones).params(team) for layer in LAYERS[:-1]}
         params["plant"] = self.mission.plant.params(self._true_team(drones))
-        self._legs.append(
-            _Leg(
-                drones=drones,
-                team=team,
-                bus=make_bus(team.n),
-                kernels=kernels,
-                compiled=all(map(is_compiled, [*kernels, *(each[0] for each in disturbances)])),
-                disturbances=Disturbances.of(disturbances),
-                params=Vectors(**params),
-                memory=Vectors(**memory),
-                begin=self._step,
-            )
-        )
+        bus = make_bus(team.n)
+        parts = {layer: type(part) for layer, part in self._parts.items()}
+        wired = circuit(bus, parts, self._keys, params, memory, disturbances)
+        self._legs.append(_Leg(drones, team, bus, wired, self._step))
 
     def _true_team(self, drones: list[int]) -> Team:
         return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
@@ -433,12 +419,8 @@ class _Leg:
 
     drones: list[int]
     team: Team
-    bus: Bus
-    kernels: list[Any]
-    compiled: bool
-    disturbances: Disturbances
-    params: Vectors
-    memory: Vectors
+    bus: Any
+    circuit: Circuit
     begin: int
     stretches: deque[_Stretch] = field(default_factory=deque)
 

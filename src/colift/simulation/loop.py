@@ -10,74 +10,44 @@ The loop is compiled when every part is, and runs as plain Python otherwise: sam
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from colift.actuation import base as actuation
-from colift.allocation import base as allocation
 from colift.allocation.base import INFO_SIZE, Status
-from colift.attitude_control import base as attitude_control
-from colift.detection import base as detection
-from colift.disturbance import base as disturbance
+from colift.catalogue import LAYERS
 from colift.disturbance import push
 from colift.errors import ColiftError
-from colift.estimation import base as estimation
 from colift.jit import f8, i8, kernel, matrix, monotonic_ns, vector
-from colift.link import base as link
-from colift.load_control import base as load_control
-from colift.plant import base as plant
-from colift.position_control import base as position_control
-from colift.reference import base as reference
-from colift.sensing import base as sensing
-from colift.simulation.signals import CYCLE_SIGNALS, SIGNALS, Bus
+from colift.kernel.ports import PORTS, Wire, named
+from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
 
 Array = NDArray[np.float64]
 
 MAX_DISTURBANCES = 8
 """Most disturbances in one mission: so many places the compiled loop has for them."""
 
-KERNEL_SIGNATURES = {
-    "reference": {"kernel": reference.SIGNATURE},
-    "sensing": {"kernel": sensing.SIGNATURE},
-    "estimation": {"kernel": estimation.SIGNATURE},
-    "load_control": {"kernel": load_control.SIGNATURE},
-    "allocation": {"kernel": allocation.SIGNATURE},
-    "link": {"kernel": link.SIGNATURE},
-    "position_control": {"kernel": position_control.SIGNATURE},
-    "attitude_control": {"kernel": attitude_control.SIGNATURE},
-    "actuation": {"kernel": actuation.SIGNATURE},
-    "detection": {"kernel": detection.SIGNATURE},
-    "plant": {"observe": plant.OBSERVE_SIGNATURE, "kernel": plant.STEP_SIGNATURE},
+FUNCTIONS = {
+    **{layer: (layer, "kernel") for layer in LAYERS},
+    "plant_observe": ("plant", "observe"),
 }
-"""Which functions the part of each layer must have, in the order in which the loop takes them."""
+"""Layer and name of the function behind each port of which a flight has one."""
 
 
-class Vectors(NamedTuple):
-    """One vector per layer: its parameters, or its memory."""
-
-    reference: Array
-    sensing: Array
-    estimation: Array
-    load_control: Array
-    allocation: Array
-    link: Array
-    position_control: Array
-    attitude_control: Array
-    actuation: Array
-    detection: Array
-    plant: Array
-
-
-class Keys(NamedTuple):
-    """Keys of the random numbers of each layer that has some."""
-
-    sensing: int
-    link: int
-    actuation: int
+Wires = named_tuple("Wires", FUNCTIONS, __name__)
+"""One :class:`~colift.kernel.ports.Wire` a port."""
+Common = named_tuple(
+    "Common",
+    [
+        "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
+        "peak_tensions", "catch_impulses", "carrying",
+    ],
+    __name__,
+)  # fmt: skip
+"""What the loop itself sees and writes of the bus."""
 
 
 class Periods(NamedTuple):
@@ -91,198 +61,82 @@ class Periods(NamedTuple):
     recording: int
 
 
-class Disturbances(NamedTuple):
-    """How many there are, and their kernels, keys, parameters and memories, filled up to the most."""
-
-    number: int
-    kernels: tuple[Any, ...]
-    keys: tuple[int, ...]
-    params: tuple[Array, ...]
-    memory: tuple[Array, ...]
-
-    def arguments(self) -> tuple[Any, ...]:
-        """As the loop takes them."""
-        return self.number, *self.kernels, self.keys, self.params, self.memory
-
-    @classmethod
-    def of(cls, each: Sequence[tuple[Any, int, Array, Array]]) -> Disturbances:
-        """From kernel, key, parameters and memory of each."""
-        filled = [*each]
-        while len(filled) < MAX_DISTURBANCES:
-            filled.append((push.Push.kernel, 0, np.zeros(0), np.zeros(0)))
-        return cls(len(each), *(tuple(column) for column in zip(*filled, strict=True)))
-
-
-VECTORS_TYPE = types.NamedUniTuple(vector, len(Vectors._fields), Vectors)
-KEYS_TYPE = types.NamedUniTuple(i8, len(Keys._fields), Keys)
-BUS_TYPE = types.NamedTuple(
-    [vector] + [vector if len(signal.shape) == 1 else matrix for signal in SIGNALS], Bus
-)
-PERIODS_TYPE = types.NamedTuple([f8] + [i8] * 5, Periods)
 CYCLE_WIDTH = len(CYCLE_SIGNALS)
 _SILENT = int(Status.SILENT)
-
 
 SIGNATURE = i8(
     i8,
     i8,
-    PERIODS_TYPE,
-    KEYS_TYPE,
-    *(
-        types.FunctionType(signature)
-        for functions in KERNEL_SIGNATURES.values()
-        for signature in functions.values()
-    ),
+    named([f8] + [i8] * 5, Periods),
+    named([PORTS[name].type for name in Wires._fields], Wires),
     i8,
-    *[types.FunctionType(disturbance.SIGNATURE)] * MAX_DISTURBANCES,
-    types.UniTuple(i8, MAX_DISTURBANCES),
-    types.UniTuple(vector, MAX_DISTURBANCES),
-    types.UniTuple(vector, MAX_DISTURBANCES),
-    VECTORS_TYPE,
-    VECTORS_TYPE,
-    vector,
-    BUS_TYPE,
+    types.UniTuple(PORTS["disturbance"].type, MAX_DISTURBANCES),
+    named([matrix if name == "external_forces" else vector for name in Common._fields], Common),
     matrix,
     matrix,
 )
 
+# Compiled code knows functions by the names of this file.
+_observe, _step = PORTS["plant_observe"].invoke, PORTS["plant"].invoke
+_sense, _estimate = PORTS["sensing"].invoke, PORTS["estimation"].invoke
+_refer, _control_load = PORTS["reference"].invoke, PORTS["load_control"].invoke
+_allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
+_control_position = PORTS["position_control"].invoke
+_control_attitude = PORTS["attitude_control"].invoke
+_actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
+_disturb = PORTS["disturbance"].invoke
+
 
 @kernel(SIGNATURE)
-def advance(  # type: ignore[no-untyped-def]
-    first,
-    last,
-    every,
-    keys,
-    reference,
-    sense,
-    estimate,
-    control_load,
-    allocate,
-    transmit,
-    control_position,
-    control_attitude,
-    actuate,
-    detect,
-    observe,
-    step,
-    disturbances,
-    disturb_0,
-    disturb_1,
-    disturb_2,
-    disturb_3,
-    disturb_4,
-    disturb_5,
-    disturb_6,
-    disturb_7,
-    disturbance_keys,
-    disturbance_params,
-    disturbance_memory,
-    params,
-    memory,
-    info,
-    bus,
-    log,
-    cycles,
-):
+def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycles):  # type: ignore[no-untyped-def]
     """Run physics steps ``first <= k < last``; return the step reached.
 
     It ends early, after a whole step, when a drone is judged lost: the caller regroups. The rows of ``log`` and
-    ``cycles`` are those due from ``first`` on.
+    ``cycles`` are those due from ``first`` on. Of the wires ``disturbing`` the first ``disturbances`` are in use.
     """
-    disturb = (
-        disturb_0, disturb_1, disturb_2, disturb_3, disturb_4, disturb_5, disturb_6, disturb_7
-    )  # fmt: skip
     dt = every.step
     n = bus.tensions.shape[0]
     first_row = (first + every.recording - 1) // every.recording
     first_cycle = (first + every.allocation - 1) // every.allocation
     for k in range(first, last):
-        observe(
-            params.plant, memory.plant, bus.load, bus.positions, bus.velocities, bus.attitudes,
-            bus.rates, bus.directions, bus.direction_rates,
-        )  # fmt: skip
-        sense(
-            k, keys.sensing, dt, bus.load, bus.positions, bus.velocities, bus.attitudes, bus.rates,
-            bus.stuck, params.sensing, memory.sensing, bus.measured_load, bus.measured_positions,
-            bus.measured_velocities, bus.measured_attitudes, bus.measured_rates,
-        )  # fmt: skip
-        estimate(
-            k, dt, bus.measured_load, bus.measured_positions, bus.measured_velocities,
-            bus.measured_attitudes, bus.measured_rates, bus.thrusts, bus.received_tensions,
-            bus.received_directions, params.estimation, memory.estimation, bus.estimated_load,
-            bus.estimated_positions, bus.estimated_velocities, bus.estimated_attitudes,
-            bus.estimated_rates,
-        )  # fmt: skip
-        reference(k * dt, params.reference, bus.reference)
+        t = k * dt
+        _observe(wires.plant_observe, k, t, dt)
+        _sense(wires.sensing, k, t, dt)
+        _estimate(wires.estimation, k, t, dt)
+        _refer(wires.reference, k, t, dt)
 
         if k % every.load_control == 0:
-            control_load(
-                bus.estimated_load, bus.reference, every.load_control * dt, params.load_control,
-                memory.load_control, bus.force,
-            )  # fmt: skip
+            _control_load(wires.load_control, k, t, every.load_control * dt)
 
         if k % every.allocation == 0:
             row = k // every.allocation - first_cycle
             if bus.allocator_up[0] != 0.0:
                 begin = monotonic_ns()
-                status = allocate(
-                    bus.force, bus.reference[2], every.allocation * dt, params.allocation,
-                    memory.allocation, bus.desired_tensions, bus.desired_directions, info,
-                )  # fmt: skip
+                status = _allocate(wires.allocation, k, t, every.allocation * dt)
                 end = monotonic_ns()
                 cycles[row, 0] = status
                 for m in range(INFO_SIZE):
-                    cycles[row, 1 + m] = info[m]
+                    cycles[row, 1 + m] = bus.allocator_info[m]
                 cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9
             else:  # nothing was asked, so nothing was measured
                 cycles[row, :] = np.nan
                 cycles[row, 0] = _SILENT
 
-        transmit(
-            k, keys.link, dt, bus.desired_tensions, bus.desired_directions, params.link,
-            memory.link, bus.received_tensions, bus.received_directions,
-        )  # fmt: skip
+        _transmit(wires.link, k, t, dt)
 
         if k % every.position_control == 0:
-            control_position(
-                bus.estimated_positions, bus.estimated_velocities, bus.estimated_attitudes,
-                bus.estimated_rates, bus.reference, bus.received_tensions,
-                bus.received_directions, every.position_control * dt,
-                params.position_control, memory.position_control, bus.drone_forces, bus.thrusts,
-                bus.desired_attitudes, bus.desired_rates,
-            )  # fmt: skip
-            detect(
-                every.position_control * dt, bus.estimated_load, bus.estimated_positions,
-                bus.estimated_velocities, bus.estimated_attitudes, bus.thrusts,
-                bus.received_tensions, bus.received_directions, params.detection,
-                memory.detection, bus.carrying,
-            )  # fmt: skip
+            _control_position(wires.position_control, k, t, every.position_control * dt)
+            _detect(wires.detection, k, t, every.position_control * dt)
 
         if k % every.attitude_control == 0:
-            control_attitude(
-                bus.estimated_attitudes, bus.estimated_rates, bus.desired_attitudes,
-                bus.desired_rates, every.attitude_control * dt, params.attitude_control,
-                memory.attitude_control, bus.torques,
-            )  # fmt: skip
+            _control_attitude(wires.attitude_control, k, t, every.attitude_control * dt)
 
-        actuate(
-            k, keys.actuation, dt, bus.thrusts, bus.torques, bus.motor_health, params.actuation,
-            memory.actuation, bus.applied_thrusts, bus.applied_torques, bus.saturated_times,
-        )  # fmt: skip
+        _actuate(wires.actuation, k, t, dt)
         bus.wind[:] = 0.0
         bus.external_forces[:] = 0.0
         for m in range(disturbances):
-            disturb[m](
-                k, disturbance_keys[m], dt, bus.load, bus.positions, bus.velocities,
-                bus.attitudes, bus.directions, bus.direction_rates, bus.applied_thrusts,
-                bus.attached, disturbance_params[m], disturbance_memory[m], bus.wind,
-                bus.external_forces,
-            )  # fmt: skip
-        step(
-            bus.applied_thrusts, bus.applied_torques, bus.external_forces, bus.attached, dt,
-            params.plant, memory.plant, bus.tensions, bus.peak_tensions, bus.catch_impulses,
-            bus.slack_times,
-        )  # fmt: skip
+            _disturb(disturbing[m], k, t, dt)
+        _step(wires.plant, k, t, dt)
 
         if k % every.recording == 0:
             log[k // every.recording - first_row, :] = bus.row
@@ -294,13 +148,38 @@ def advance(  # type: ignore[no-untyped-def]
     return last
 
 
-def is_compiled(function: Any) -> bool:
-    """Whether a part's kernel is compiled (and so can go into the compiled loop)."""
-    return hasattr(function, "py_func")
+class Circuit(NamedTuple):
+    """All that the loop calls, wired to one bus."""
+
+    wires: Any
+    disturbances: tuple[Wire, ...]
+    common: Any
+
+    @property
+    def compiled(self) -> bool:
+        """Whether every kernel is compiled, and so the loop can be."""
+        return all(is_compiled(wire.kernel) for wire in (*self.wires, *self.disturbances))
+
+    def arguments(self) -> tuple[Any, ...]:
+        """As :func:`advance` takes them, compiled or not."""
+        if not self.compiled:
+            return self.wires, len(self.disturbances), self.disturbances, self.common
+        wires = type(self.wires)(*(wire.compiled() for wire in self.wires))
+        port, used = PORTS["disturbance"], [wire.compiled() for wire in self.disturbances]
+        spare = port.wire(push.Push.kernel, np.zeros(0), np.zeros(0), port.signals(1)).compiled()
+        filled = (*used, *[spare] * (MAX_DISTURBANCES - len(used)))
+        return wires, len(used), filled, self.common
 
 
-def kernels_of(parts: Mapping[str, type]) -> list[Any]:
-    """The kernels of one part a layer, in the loop's order.
+def circuit(
+    bus: Any,
+    parts: Mapping[str, type],
+    keys: Mapping[str, int],
+    params: Mapping[str, Array],
+    memory: Mapping[str, Array],
+    disturbances: Iterable[tuple[type, int, Array, Array]],
+) -> Circuit:
+    """Wire the parts of all layers, and disturbances with key, parameters and memory, to a bus.
 
     Raises
     ------
@@ -308,16 +187,28 @@ def kernels_of(parts: Mapping[str, type]) -> list[Any]:
         For a compiled kernel that was not compiled for its layer's signature.
 
     """
-    return [
-        _checked(layer, parts[layer], name, wanted)
-        for layer, signatures in KERNEL_SIGNATURES.items()
-        for name, wanted in signatures.items()
-    ]
+    signals = bus._asdict()
+    wires = {
+        name: PORTS[name].wire(
+            _checked(layer, parts[layer], function, PORTS[name].signature),
+            params[layer], memory[layer], signals, key=keys[layer],
+        )
+        for name, (layer, function) in FUNCTIONS.items()
+    }  # fmt: skip
+    port = PORTS["disturbance"]
+    others = tuple(
+        port.wire(
+            _checked("disturbance", part, "kernel", port.signature), own, kept, signals, key=key
+        )
+        for part, key, own, kept in disturbances
+    )
+    common = Common(*(signals[name] for name in Common._fields))
+    return Circuit(Wires(**wires), others, common)
 
 
-def disturbance_kernel(part: type) -> Any:
-    """The kernel of a disturbance; errors as for :func:`kernels_of`."""
-    return _checked("disturbance", part, "kernel", disturbance.SIGNATURE)
+def is_compiled(function: Any) -> bool:
+    """Whether a part's kernel is compiled (and so can go into the compiled loop)."""
+    return hasattr(function, "py_func")
 
 
 def _checked(layer: str, part: type, name: str, wanted: Any) -> Any:
@@ -327,6 +218,6 @@ def _checked(layer: str, part: type, name: str, wanted: Any) -> Any:
         raise ColiftError(
             f"{layer} part {part.__name__}: its {name} is compiled for "
             f"{', '.join(map(str, offered)) or 'nothing'}, but this layer's functions have "
-            f"the signature {wanted} (see colift.{layer}.base)"
+            f"the signature {wanted} (see colift.kernel.ports)"
         )
     return function

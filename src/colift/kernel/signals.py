@@ -6,13 +6,20 @@ the row to the log records all of them at once, and this table is the legend of 
 
 from __future__ import annotations
 
+from collections import namedtuple
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+def named_tuple(name: str, fields: Iterable[str], module: str) -> Any:
+    """A class of named tuples, found again in ``module`` under its name, as the cache of kernels needs it."""
+    return namedtuple(name, tuple(fields), module=module)
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,16 @@ SIGNALS = (
 CONDITIONS = ("attached", "motor_health", "stuck", "allocator_up")
 """Signals that say what still works; faults change them."""
 
+ANSWER = Signal(
+    "allocator_info",
+    (6,),
+    "-",
+    "-",
+    "-",
+    "what an allocator says of its answer: the middle ones of CYCLE_SIGNALS",
+)
+"""Not recorded as such."""
+
 CYCLE_SIGNALS = tuple(
     replace(signal, each="allocation")
     for signal in (
@@ -101,55 +118,11 @@ CYCLE_SIGNALS = tuple(
 """Recorded once per allocation, in this order."""
 
 LEGEND = {signal.name: signal for signal in (*SIGNALS, *CYCLE_SIGNALS)}
-"""All of them by name."""
+"""All that are recorded, by name."""
 
 
-class Bus(NamedTuple):
-    """Views of the bus row, one per signal, and the row itself."""
-
-    row: Array
-    reference: Array
-    load: Array
-    force: Array
-    desired_tensions: Array
-    desired_directions: Array
-    tensions: Array
-    peak_tensions: Array
-    catch_impulses: Array
-    directions: Array
-    direction_rates: Array
-    positions: Array
-    velocities: Array
-    attitudes: Array
-    rates: Array
-    drone_forces: Array
-    thrusts: Array
-    desired_attitudes: Array
-    desired_rates: Array
-    torques: Array
-    external_forces: Array
-    attached: Array
-    slack_times: Array
-    measured_load: Array
-    measured_positions: Array
-    measured_velocities: Array
-    measured_attitudes: Array
-    measured_rates: Array
-    estimated_load: Array
-    estimated_positions: Array
-    estimated_velocities: Array
-    estimated_attitudes: Array
-    estimated_rates: Array
-    received_tensions: Array
-    received_directions: Array
-    applied_thrusts: Array
-    applied_torques: Array
-    saturated_times: Array
-    wind: Array
-    carrying: Array
-    motor_health: Array
-    stuck: Array
-    allocator_up: Array
+Bus = named_tuple("Bus", ["row", ANSWER.name, *(signal.name for signal in SIGNALS)], __name__)
+"""The bus row, its views, one per recorded signal, and what an allocator says of its answer."""
 
 
 def columns(n: int) -> dict[str, slice]:
@@ -162,11 +135,12 @@ def columns(n: int) -> dict[str, slice]:
     return where
 
 
-def make_bus(n: int) -> Bus:
+def make_bus(n: int) -> Any:
     """A bus for n drones, every signal at its initial value."""
     where = columns(n)
     row = np.zeros(max(part.stop for part in where.values()))
     views = {s.name: row[where[s.name]].reshape(s.shape_for(n)) for s in SIGNALS}
     for s in SIGNALS:
         views[s.name][:] = s.initial
+    views[ANSWER.name] = np.zeros(ANSWER.shape_for(n))
     return Bus(row=row, **views)

@@ -1,0 +1,255 @@
+"""Through which ports the layers see and write signals.
+
+Every kernel of every part has the same five arguments::
+
+    kernel(now, sees, params, memory, writes)
+
+``now`` is a :class:`Now`; ``sees`` and ``writes`` hold the arrays of the signals that the layer's port
+names, by name (``sees.estimated_load``); ``params`` and ``memory`` are the part's own vectors. Shapes, units
+and frames are those of the signals (:data:`colift.kernel.signals.SIGNALS`). What a layer writes holds, on
+entry, what it wrote last.
+
+A layer that is to see one more signal gets its name in :data:`PORTS`: one line, and no kernel that does not
+use it changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+from numpy.typing import NDArray
+
+from colift.jit import address_of, f8, i8, matrix, vector, void
+from colift.kernel.signals import ANSWER, LEGEND, Signal, named_tuple
+
+Array = NDArray[np.float64]
+
+
+class Now(NamedTuple):
+    """When a kernel is called, and the key of its random numbers."""
+
+    step: int
+    """Number of the physics step."""
+    time: float
+    """Of that step, s."""
+    dt: float
+    """Since the last call, s: the physics step, or the layer's own period."""
+    key: int
+    """Of this part's random numbers (:mod:`colift.math.noise`)."""
+
+
+class Wire(NamedTuple):
+    """A kernel and all that it is called with, but for the time."""
+
+    kernel: Any
+    """The function; for compiled code its address (:func:`colift.jit.address_of`)."""
+    key: int
+    """Of its random numbers."""
+    params: Array
+    memory: Array
+    sees: Any
+    """The signals that it sees, by name."""
+    writes: Any
+    """The signals that it writes, by name."""
+
+    def compiled(self) -> Wire:
+        """The same for compiled code."""
+        return self._replace(kernel=address_of(self.kernel))
+
+
+def named(each: Iterable[Any], made: Any) -> Any:
+    """Numba's type of a class of named tuples whose fields have these types."""
+    return types.BaseTuple.from_types(tuple(each), made)
+
+
+NOW_TYPE = named([i8, f8, f8, i8], Now)
+
+_SIGNALS: dict[str, Signal] = {**LEGEND, ANSWER.name: ANSWER}
+
+
+def _words(name: str) -> str:
+    return "".join(word.title() for word in name.split("_"))
+
+
+def _tuple(name: str, signals: Iterable[str]) -> Any:
+    globals()[name] = made = named_tuple(name, signals, __name__)
+    return made
+
+
+def _type(made: Any) -> Any:
+    arrays = [vector if len(_SIGNALS[name].shape) == 1 else matrix for name in made._fields]
+    return named(arrays, made)
+
+
+def _invoke(signature: Any) -> Callable[[Wire, int, float, float], Any]:
+    """A function that calls the kernel of a wire with this signature, from Python or from compiled code."""
+
+    def invoke(wire, step, time, dt):  # type: ignore[no-untyped-def]
+        now = Now(step, time, dt, wire.key)
+        return wire.kernel(now, wire.sees, wire.params, wire.memory, wire.writes)
+
+    @intrinsic
+    def by_address(typingctx, address, now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+        def codegen(context, builder, _, args):  # type: ignore[no-untyped-def]
+            calling, returns = context.call_conv, signature.return_type
+            function = calling.get_function_type(returns, signature.args).as_pointer()
+            pointer = builder.inttoptr(args[0], function)
+            status, answer = calling.call_function(
+                builder, pointer, returns, signature.args, args[1:]
+            )
+            with cgutils.if_unlikely(builder, status.is_error):
+                calling.return_status_propagate(builder, status)
+            return answer
+
+        return signature.return_type(i8, *signature.args), codegen
+
+    call: Any = by_address
+
+    @overload(invoke)
+    def _(wire, step, time, dt):  # type: ignore[no-untyped-def]
+        def compiled(wire, step, time, dt):  # type: ignore[no-untyped-def]
+            now = Now(step, time, dt, wire.key)
+            return call(wire.kernel, now, wire.sees, wire.params, wire.memory, wire.writes)
+
+        return compiled
+
+    return invoke
+
+
+@dataclass(frozen=True)
+class Port:
+    """What one kind of kernel sees and writes, and so its signature.
+
+    Attributes
+    ----------
+    name : str
+        Of the layer; for its second function, ``layer_function``.
+    sees, writes : tuple of str
+        Names of signals.
+    answers : bool
+        Whether the kernel returns a status.
+    signature : Numba signature
+        For :func:`colift.jit.kernel`.
+    invoke : callable
+        ``invoke(wire, step, time, dt)`` calls the kernel of a :class:`Wire`, from Python or from compiled code.
+
+    """
+
+    name: str
+    sees: tuple[str, ...]
+    writes: tuple[str, ...]
+    answers: bool = False
+    Sees: Any = field(init=False, repr=False)
+    Writes: Any = field(init=False, repr=False)
+    signature: Any = field(init=False, repr=False)
+    invoke: Any = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        keep = object.__setattr__
+        keep(self, "Sees", _tuple(f"{_words(self.name)}Sees", self.sees))
+        keep(self, "Writes", _tuple(f"{_words(self.name)}Writes", self.writes))
+        returns = i8 if self.answers else void
+        arguments = (NOW_TYPE, _type(self.Sees), vector, vector, _type(self.Writes))
+        keep(self, "signature", returns(*arguments))
+        keep(self, "invoke", _invoke(self.signature))
+
+    @property
+    def type(self) -> Any:
+        """Numba type of its wires."""
+        _, sees, params, memory, writes = self.signature.args
+        return named([i8, i8, params, memory, sees, writes], Wire)
+
+    def signals(self, n: int, **given: Any) -> dict[str, Array]:
+        """Its signals for a team of n drones: those given, for the others new arrays of their initial values."""
+        if unknown := {*given} - {*self.sees, *self.writes}:
+            raise TypeError(f"{self.name}: its port has no {', '.join(sorted(unknown))}")
+        found = {name: np.ascontiguousarray(value, dtype=float) for name, value in given.items()}
+        for name in {*self.sees, *self.writes} - {*found}:
+            found[name] = np.full(_SIGNALS[name].shape_for(n), _SIGNALS[name].initial)
+        return found
+
+    def wire(
+        self,
+        kernel: Callable[..., Any],
+        params: Array,
+        memory: Array,
+        signals: Mapping[str, Array],
+        *,
+        key: int = 0,
+    ) -> Wire:
+        """A kernel of this port, wired to signals by name."""
+        sees = self.Sees(*(signals[name] for name in self.sees))
+        writes = self.Writes(*(signals[name] for name in self.writes))
+        return Wire(kernel, key, params, memory, sees, writes)
+
+
+_TRUE = "load positions velocities attitudes rates"
+
+
+def _named(prefix: str) -> tuple[str, ...]:
+    return tuple(f"{prefix}_{name}" for name in _TRUE.split())
+
+
+_RECEIVED = ("received_tensions", "received_directions")
+
+PORTS: dict[str, Port] = {
+    port.name: port
+    for port in (
+        Port("reference", sees=(), writes=("reference",)),
+        Port("sensing", sees=(*_TRUE.split(), "stuck"), writes=_named("measured")),
+        Port(
+            "estimation",
+            sees=(*_named("measured"), "thrusts", *_RECEIVED),
+            writes=_named("estimated"),
+        ),
+        Port("load_control", sees=("estimated_load", "reference"), writes=("force",)),
+        Port(
+            "allocation",
+            sees=("force", "reference"),
+            writes=("desired_tensions", "desired_directions", "allocator_info"),
+            answers=True,
+        ),
+        Port("link", sees=("desired_tensions", "desired_directions"), writes=_RECEIVED),
+        Port(
+            "position_control",
+            sees=(*_named("estimated")[1:], "reference", *_RECEIVED),
+            writes=("drone_forces", "thrusts", "desired_attitudes", "desired_rates"),
+        ),
+        Port(
+            "attitude_control",
+            sees=("estimated_attitudes", "estimated_rates", "desired_attitudes", "desired_rates"),
+            writes=("torques",),
+        ),
+        Port(
+            "actuation",
+            sees=("thrusts", "torques", "motor_health"),
+            writes=("applied_thrusts", "applied_torques", "saturated_times"),
+        ),
+        Port(
+            "detection",
+            sees=(*_named("estimated")[:4], "thrusts", *_RECEIVED),
+            writes=("carrying",),
+        ),
+        Port("plant_observe", sees=(), writes=(*_TRUE.split(), "directions", "direction_rates")),
+        Port(
+            "plant",
+            sees=("applied_thrusts", "applied_torques", "external_forces", "attached"),
+            writes=("tensions", "peak_tensions", "catch_impulses", "slack_times"),
+        ),
+        Port(
+            "disturbance",
+            sees=(
+                "load", "positions", "velocities", "attitudes", "directions", "direction_rates",
+                "applied_thrusts", "attached",
+            ),
+            writes=("wind", "external_forces"),
+        ),
+    )
+}  # fmt: skip
+"""By layer, in the order in which the loop calls them; a plant has two functions."""
