@@ -13,14 +13,12 @@ from colift.allocation.base import AllocatorPart, Status
 
 
 def share(now, sees, params, memory, writes):
-    """Least ``sum T_i^2 / charge_i`` along the directions that the flight starts with."""
-    force, info = sees.force, writes.allocator_info
-    tensions, directions = writes.desired_tensions, writes.desired_directions
+    """Least ``sum T_i^2 / charge_i`` along the directions that the flight starts with; no cable pushes."""
+    force, (tensions, directions, info) = sees.force, writes
     if not np.isfinite(force @ force):
         return Status.INVALID_FORCE
     weighted = params[:, None] * directions
-    tensions[:] = -weighted @ np.linalg.pinv(directions.T @ weighted) @ force
-    np.maximum(tensions, 0.0, out=tensions)  # a cable cannot push
+    np.maximum(-weighted @ np.linalg.pinv(directions.T @ weighted) @ force, 0.0, out=tensions)
     info[:] = 0.0, np.nan, np.nan, np.nan, np.linalg.norm(tensions @ directions + force), 0.0
     return Status.CONVERGED if info[4] <= 1e-9 * np.linalg.norm(force) else Status.CLAMPED
 

@@ -153,9 +153,9 @@ print(json.dumps([told, done.compiled, done.loaded, again.compiled, again.loaded
         assert done.stderr == ""  # a library prints nothing
         runs.append(json.loads(done.stdout))
     first, second = runs
-    name = "allocation.min_norm.allocate"
-    assert first == [[[0.0, name], [1.0, ""]], [name], 0, [], 0]
-    assert second == [[[1.0, ""]], [], 1, [], 0]
+    call, own = "allocation.base.ask", "allocation.min_norm.allocate"
+    assert first == [[[0.0, call], [0.0, own], [1.0, ""]], [call, own], 0, [], 0]
+    assert second == [[[1.0, ""]], [], 2, [], 0]
 
 
 @needs_jit
@@ -169,7 +169,7 @@ def test_compile_says_how_much_it_did_and_is_done_when_all_is_there(tmp_path):
         for _ in range(2)
     ]  # fmt: skip
     assert [(each["compiled"], each["loaded"]) for each in done] == [
-        (["allocation.min_norm.allocate"], 0), ([], 1),
+        (["allocation.base.ask", "allocation.min_norm.allocate"], 0), ([], 2),
     ]  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from colift.allocation._heaviest import Limits, best_tensions, extreme
 from colift.allocation._hover import hover_conflicts, thrusts_of
+from colift.errors import SettingError
 from colift.geometry import pairwise_angles, ring
 from colift.team import Team
 
@@ -385,15 +386,17 @@ def spread_formation(n: int, cone: float, min_angle: float) -> Array:
 
     Raises
     ------
-    ValueError
+    SettingError
         If no such formation is found; names both limits and the widest angle that was found.
 
     """
     best, angle = widest_formation(n, cone, enough=min_angle)
     if angle < min_angle:
-        raise ValueError(
-            f"min_angle {math.degrees(min_angle):.4g} deg conflicts with cone {math.degrees(cone):.4g} deg: "
-            f"{n} cables in it are at most {math.degrees(angle):.1f} deg apart"
+        raise SettingError.of(
+            "min_angle",
+            f"{math.degrees(min_angle):.4g} deg",
+            f"conflicts with cone {math.degrees(cone):.4g} deg: {n} cables in it are at most "
+            f"{math.degrees(angle):.1f} deg apart",
         )
     return best
 

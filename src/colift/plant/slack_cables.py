@@ -80,8 +80,28 @@ def complementarity(n, alpha, b, taut, params, held, T):  # type: ignore[no-unty
         T[i] = max(T[i], 0.0)
 
 
+CONTACT = 0.01
+"""Within what time of each other catches are one burst, s: as long as a braided cable pulls before it rebounds."""
+
+
 @inline
-def catch(n, y, attached, slow, params, taut, held, T, alpha, b, catch_impulses):  # type: ignore[no-untyped-def]
+def note_parting(n, y, dt, parting):  # type: ignore[no-untyped-def]
+    """Keep how fast the ends of each slack cable part, unless a burst of catches is on; last, the time since a catch.
+
+    What stops a drone and the load is judged by the speed before any cable of the burst was caught: which of them
+    is caught a microsecond before the others is chance, and each catch changes the load's speed for the next.
+    """
+    parting[n] += dt
+    if parting[n] <= CONTACT:
+        return
+    for i in range(n):
+        o = LOAD + DRONE * i
+        x, y_, z, _ = line(y, o)
+        parting[i] = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
+
+
+@inline
+def catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses):  # type: ignore[no-untyped-def]
     """Find the taut cables, those at full length that shorten at most ``slow``; impulses stop any that grow."""
     lines(n, y, alpha, b)
     beyond = False
@@ -97,7 +117,9 @@ def catch(n, y, attached, slow, params, taut, held, T, alpha, b, catch_impulses)
     for i in range(n):
         if taut[i] > 0.0 and b[i] > SLOW:
             jerk = True
-            catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, b[i], params))
+            speed = parting[i] if parting[i] > SLOW else b[i]
+            catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, speed, params))
+            parting[i] = parting[n] = 0.0
     if jerk:
         complementarity(n, alpha, b, taut, params, held, T)
         pull(n, alpha, T, params, 3, y)
@@ -122,12 +144,13 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     slope = memory[3 * size : 4 * size]
     rest = memory[4 * size :]
     T, b, taut, held = rest[:n], rest[n : 2 * n], rest[2 * n : 3 * n], rest[3 * n : 4 * n]
-    alpha = rest[4 * n : 7 * n]
+    alpha, parting = rest[4 * n : 7 * n], rest[7 * n :]
+    note_parting(n, y, dt, parting)
     left = dt
     for event in range(EVENTS * n + 1):
         last = event == EVENTS * n
         slow = math.inf if last else SLOW
-        catch(n, y, attached, slow, params, taut, held, T, alpha, b, catch_impulses)
+        catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses)
         free_motion(n, y, thrusts, torques, external, params, slope)
         lines(n, y, alpha, b)
         demand(n, y, slope, alpha, b)
@@ -178,4 +201,4 @@ class SlackCables(BodiesPart):
     kernel = _step
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * state_size(team.n) + 7 * team.n)
+        return np.zeros(4 * state_size(team.n) + 8 * team.n + 1)

@@ -6,9 +6,8 @@ import hashlib
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
-from itertools import takewhile
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -29,7 +28,8 @@ from colift.part import LAYERS, Part, Vector, make
 from colift.plant.base import Start
 from colift.recording import Recording
 from colift.reference.descent import Descent
-from colift.simulation.loop import CYCLE_WIDTH, Circuit, Periods, advance, circuit
+from colift.simulation.leg import Leg, Stretch, due_rows, places_of
+from colift.simulation.loop import CYCLE_WIDTH, Periods, advance, circuit
 from colift.team import Team
 from colift.wording import numbers
 
@@ -77,7 +77,7 @@ class Flight:
         self._disturbances: dict[int, DisturbancePart] = dict(winds_first)
         self._load_mass = mission.true_team.load_mass
         self._due = sorted(timetable(mission), key=lambda item: item[0])
-        self._legs: list[_Leg] = []
+        self._legs: list[Leg] = []
         drones = mission.first_drones()
         start = start_state(mission)
         self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
@@ -215,7 +215,7 @@ class Flight:
         """
         old = self._legs[-1]
         team = self.mission.team.of(drones)
-        places = _places(old.drones, drones)
+        places = places_of(old.drones, drones)
         stay, new = places[places >= 0], places < 0
         directions = np.zeros((team.n, 3))
         directions[~new] = old.bus.directions[stay]
@@ -251,7 +251,7 @@ class Flight:
         """What has been recorded, from ``since`` (s) on; NaN for a drone that has left."""
         every, n = self._every, self.mission.drones.count
         begin = max(self._legs[0].begin, round(since / every.step))
-        first, rows = -(-begin // every.recording), _due_rows(begin, self._step, every.recording)
+        first, rows = -(-begin // every.recording), due_rows(begin, self._step, every.recording)
         arrays = {s.name: np.full((rows, *s.shape_for(n)), np.nan) for s in SIGNALS}
         cycles = []
         filled = 0
@@ -303,6 +303,37 @@ class Flight:
             leg.forget(step)
         self._legs = [leg for leg in self._legs[:-1] if leg.stretches] + self._legs[-1:]
 
+    def snapshot(self) -> Snapshot:
+        """The flight as it is now, to go on from once more: :meth:`restore`."""
+        return Snapshot(
+            step=self._step,
+            outcome=self.outcome,
+            found=tuple(self.found),
+            descent=self.descent,
+            load_mass=self._load_mass,
+            due=tuple(self._due),
+            parts=dict(self._parts),
+            disturbances=dict(self._disturbances),
+            legs=tuple((leg, leg.begin, tuple(leg.stretches)) for leg in self._legs),
+            state=tuple(each.copy() for each in self._legs[-1].state()),
+        )
+
+    def restore(self, before: Snapshot) -> None:
+        """Go back to a snapshot of this flight; what follows is the same again, bit for bit.
+
+        Parts that keep something outside of their memory, as plain Python may, do not go back.
+        """
+        self._step, self.outcome, self.descent = before.step, before.outcome, before.descent
+        self.found, self._due, self._load_mass = (
+            list(before.found), list(before.due), before.load_mass
+        )  # fmt: skip
+        self._parts, self._disturbances = dict(before.parts), dict(before.disturbances)
+        self._legs = [leg for leg, _, _ in before.legs]
+        for leg, begin, stretches in before.legs:
+            leg.begin, leg.stretches = begin, deque(stretches)
+        for vector, kept in zip(self._legs[-1].state(), before.state, strict=True):
+            vector[:] = kept
+
     def _fly_to(self, stop: int) -> None:
         """Fly to a step; on the way apply what is due, and regroup when a drone is judged lost."""
         while self._step < stop and self.outcome == "completed":
@@ -345,14 +376,14 @@ class Flight:
         """Run the loop up to a step, or until it ends early; keep what it recorded."""
         leg, every = self._legs[-1], self._every
         loop: Any = advance if leg.circuit.compiled else getattr(advance, "py_func", advance)
-        log = np.zeros((_due_rows(self._step, stop, every.recording), leg.bus.row.size))
-        cycles = np.zeros((_due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
+        log = np.zeros((due_rows(self._step, stop, every.recording), leg.bus.row.size))
+        cycles = np.zeros((due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
         begin = time.perf_counter()
         reached = loop(self._step, stop, every, *leg.circuit.arguments(), log, cycles)
         self.loop_time += time.perf_counter() - begin
-        log = log[: _due_rows(self._step, reached, every.recording)]
-        cycles = cycles[: _due_rows(self._step, reached, every.allocation)]
-        leg.stretches.append(_Stretch(self._step, reached, log, cycles))
+        log = log[: due_rows(self._step, reached, every.recording)]
+        cycles = cycles[: due_rows(self._step, reached, every.allocation)]
+        leg.stretches.append(Stretch(self._step, reached, log, cycles))
         self._step = reached
 
     def _apply(self, due: Event | Change) -> None:
@@ -389,7 +420,7 @@ class Flight:
             remembered = part.memory(team)
             if old is not None:
                 before = old.circuit.disturbances[place].memory
-                remembered = part.carry_over(before, remembered, _places(old.drones, drones))
+                remembered = part.carry_over(before, remembered, places_of(old.drones, drones))
             key = random_key(self.mission.seed, f"disturbance.{number}")
             packed = part.of(drones).params(team)
             disturbances.append((type(part), key, packed, remembered))
@@ -398,52 +429,25 @@ class Flight:
         bus = make_bus(team.n)
         parts = {layer: type(part) for layer, part in self._parts.items()}
         wired = circuit(bus, parts, self._keys, params, memory, disturbances)
-        self._legs.append(_Leg(drones, team, bus, wired, self._step))
+        self._legs.append(Leg(drones, team, bus, wired, self._step))
 
     def _true_team(self, drones: list[int]) -> Team:
         return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
 
 
-class _Stretch(NamedTuple):
-    """What the steps ``first <= k < stop`` recorded."""
+class Snapshot(NamedTuple):
+    """What :meth:`Flight.restore` needs to go on from a moment once more."""
 
-    first: int
-    stop: int
-    log: NDArray[np.float64]
-    cycles: NDArray[np.float64]
-
-
-@dataclass
-class _Leg:
-    """A stretch of the flight with the same drones and parts, what the loop needs, what it recorded."""
-
-    drones: list[int]
-    team: Team
-    bus: Any
-    circuit: Circuit
-    begin: int
-    stretches: deque[_Stretch] = field(default_factory=deque)
-
-    def recorded(
-        self, begin: int, every: Periods
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Rows of the log and allocations due from a step on."""
-        late = takewhile(lambda each: each.stop > begin, reversed(self.stretches))
-        found = list(late)[::-1]
-        if not found:
-            return np.zeros((0, self.bus.row.size)), np.zeros((0, CYCLE_WIDTH))
-        log = np.concatenate([each.log for each in found])
-        cycles = np.concatenate([each.cycles for each in found])
-        first = found[0].first
-        if first >= begin:
-            return log, cycles
-        rows, allocations = every.recording, every.allocation
-        return log[_due_rows(first, begin, rows) :], cycles[_due_rows(first, begin, allocations) :]
-
-    def forget(self, before: int) -> None:
-        """Drop the stretches that ended by a step."""
-        while self.stretches and self.stretches[0].stop <= before:
-            self.begin = self.stretches.popleft().stop
+    step: int
+    outcome: str
+    found: tuple[tuple[float, int], ...]
+    descent: str
+    load_mass: float
+    due: tuple[tuple[int, Event | Change], ...]
+    parts: dict[str, Part]
+    disturbances: dict[int, DisturbancePart]
+    legs: tuple[tuple[Leg, int, tuple[Stretch, ...]], ...]
+    state: tuple[NDArray[np.float64], ...]
 
 
 def timetable(mission: Mission) -> list[tuple[int, Event | Change]]:
@@ -460,16 +464,6 @@ def random_key(seed: int, name: str) -> int:
     """Key of one part's random numbers (:mod:`colift.math.noise`): any integer of 64 bits."""
     digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
     return int.from_bytes(digest[:8], "big", signed=True)
-
-
-def _due_rows(first: int, stop: int, period: int) -> int:
-    """How many of the steps ``first <= k < stop`` are whole multiples of the period."""
-    return -(-stop // period) - -(-first // period)
-
-
-def _places(old: list[int], new: list[int]) -> NDArray[np.int64]:
-    """Place that each new drone had among the old ones, or -1."""
-    return np.array([old.index(drone) if drone in old else -1 for drone in new])
 
 
 def _with(part: AnyPart, section: str, name: str, value: Any) -> AnyPart:
