@@ -28,7 +28,7 @@ def measure():
 def main():
     found = stored(__file__, measure)
     rows = [
-        [f"`{kind}`", *(f"{1e3 * each[n]:.2g}" for n in ("4", "16"))]
+        [f"`{kind}`", *(f"{float(f'{1e3 * each[n]:.2g}'):g}" for n in ("4", "16"))]
         for kind, each in found["plants"].items()
     ]
     fill("theory/plant.md", "costs", table(["plant", "4 drones (ms)", "16 drones (ms)"], rows))
