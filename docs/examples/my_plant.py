@@ -10,18 +10,19 @@ import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
-from colift.plant.base import STEP_SIGNATURE
+from colift.plant.base import STATE, STEP_SIGNATURE
 from colift.plant.rigid_cables import RigidCables
 
 rigid_step = RigidCables.kernel
+S = STATE.at
 
 
 @kernel(STEP_SIGNATURE)
 def step(now, sees, params, memory, writes):
     on_load = sees.external_forces[-1]
     drag = params[params.shape[0] - 1]
-    for k in range(3):  # memory[3:6] is the velocity of the load
-        on_load[k] -= drag * memory[3 + k]
+    for k in range(3):
+        on_load[k] -= drag * memory[S.load_velocity + k]
     rigid_step(now, sees, params, memory, writes)
     for k in range(3):
         on_load[k] = 0.0

@@ -3,17 +3,20 @@
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
+from colift.kernel.layout import Layout
 from colift.reference.base import SIGNATURE, ReferencePart
+
+PARAMS = Layout(team={"height": 1, "amplitude": 1, "rate": 1})
+P = PARAMS.at
 
 
 @kernel(SIGNATURE)
 def bob(now, sees, params, memory, writes):
     t, reference = now.time, writes.reference
-    height, amplitude, rate = params[0], params[1], params[2]
+    height, amplitude, rate = params[P.height], params[P.amplitude], params[P.rate]
     reference[:] = 0.0
     # Starts at rest: 1 - cos, and its derivatives.
     reference[0, 2] = height + amplitude * (1.0 - math.cos(rate * t))
@@ -35,4 +38,5 @@ class Bob(ReferencePart):
     """Time of one stroke up and down, s."""
 
     def params(self, team):
-        return np.array([self.height, self.amplitude, 2.0 * np.pi / self.period])
+        rate = 2.0 * math.pi / self.period
+        return PARAMS.pack(team.n, height=self.height, amplitude=self.amplitude, rate=rate)

@@ -153,7 +153,7 @@ def _cache_for(function: Callable[..., Any]) -> Iterator[None]:
 def cache_folder(folder: Path) -> Path:
     """Where the kernels of a source folder are cached; ``COLIFT_CACHE`` moves it."""
     package = Path(__file__).parent
-    sources = [Path(__file__), *(package / "math").glob("*.py")]
+    sources = [Path(__file__), *(package / "math").glob("*.py"), *(package / "kernel").glob("*.py")]
     if folder.is_relative_to(package):
         sources += folder.glob("*.py")
     digest = hashlib.sha256(numba.__version__.encode())

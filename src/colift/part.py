@@ -25,6 +25,7 @@ from colift.catalogue import LAYERS as LAYERS
 from colift.catalogue import LISTS as LISTS
 from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.extras import install
+from colift.kernel.layout import Layout
 from colift.team import Team
 from colift.wording import problems_of
 
@@ -62,6 +63,8 @@ class Part(BaseModel, metaclass=Refusing):
     kernel: ClassVar[Callable[..., Any]]
     needs: ClassVar[tuple[str, str] | None] = None
     """Package beyond colift's own that the kernel calls, and the extra that it belongs to."""
+    remembers: ClassVar[Layout] = Layout()
+    """Names of the places in the kernel's memory; a part whose memory depends on its settings overrides :meth:`memory`."""
     per_drone: ClassVar[tuple[str, ...]] = ()
     """Settings that may be a list with one value per drone."""
 
@@ -94,16 +97,17 @@ class Part(BaseModel, metaclass=Refusing):
 
     def memory(self, team: Team) -> Vector:
         """Memory vector of the kernel in its initial state (integrators, warm starts, scratch)."""
-        return np.zeros(0)
+        return self.remembers.zeros(team.n)
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         """Memory for the flight's next leg, after a drone has left or joined.
 
         ``old`` is the memory so far, ``fresh`` that of a start with the new team; ``places[i]`` is the
-        place that drone i of the new team had in the old one, or -1. What does not depend on the number
-        of drones is kept, anything else starts anew; a part that remembers something per drone
-        overrides this, mostly with :func:`carry_rows`.
+        place that drone i of the new team had in the old one, or -1. What :attr:`remembers` names is kept; of other
+        vectors those whose length does not depend on the number of drones.
         """
+        if self.remembers.at.rows + self.remembers.at.width > 0:
+            return self.remembers.carry_over(old, fresh, places)
         return old if fresh.size == old.size else fresh
 
     def call(

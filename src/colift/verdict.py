@@ -231,7 +231,7 @@ def _seen(recording: Recording, values: Mapping[str, float]) -> list[str]:
         )
     failures = values.get("allocator_failures", math.nan)
     if failures > 0:
-        found.append(f"{failures:.0f} allocations not ok")
+        found.append(f"{failures:.0f} allocation{'s' if failures != 1.0 else ''} not ok")
     silent = values.get("allocator_silent", math.nan)
     if silent > 0:
         found.append(f"the allocator was silent in {silent:.0f} cycles")

@@ -12,6 +12,7 @@ from colift.attitude_control.delay_aware import DelayAware
 from colift.estimation.predictor import Predictor, steady_gains
 from colift.load_control.adaptive import Adaptive
 from colift.mission import load_mission
+from colift.position_control import disturbance_observer as observer
 from colift.position_control.disturbance_observer import DisturbanceObserver
 from colift.simulation.flight import Flight
 from colift.team import Team
@@ -110,9 +111,8 @@ class Observed:
         self.u = writes.drone_forces
         pull = self.thrusts[:, None] * axes - self.team.masses[:, None] * [0.0, 0.0, g]
         self.velocities += PERIOD * (pull + pushes) / self.team.masses[:, None]
-        rows = self.memory.reshape(n, -1)
-        self.wind = rows[0, 22:25]
-        return rows[:, 19:22]
+        self.wind = observer.MEMORY.view(self.memory, "wind")[0]
+        return observer.MEMORY.view(self.memory, "force")
 
 
 def test_a_drone_that_points_elsewhere_is_not_taken_for_one_in_the_wind():

@@ -11,8 +11,10 @@ from pydantic import Field
 
 from colift.attitude_control.base import SIGNATURE, AttitudeControlPart
 from colift.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.math import quaternion
-from colift.part import Places, Vector, carry_rows
+from colift.math.smooth import decay
+from colift.part import Vector
 from colift.team import Team
 from colift.tuning import Delays
 
@@ -22,19 +24,23 @@ if TYPE_CHECKING:
 YAW = 0.25
 """Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
 
-# params: predicted delay, lag; rho and most angular acceleration (3 each); how long silence is made up for, and from
-# when on; then J and K_d of each drone (3 each)
-_COAST, _STEADY, _HEAD = 8, 9, 10
 _MOST = 64  # control periods that a predicted delay may last
-# Memory per drone: past torques, newest first; the torque that acts; last measured rate (3 each); time since it changed
-_ACTING, _LAST, _SILENCE = 3 * _MOST, 3 * _MOST + 3, 3 * _MOST + 6
-_SLOTS = 3 * _MOST + 7
+
+PARAMS = Layout(
+    team={"delay": 1, "lag": 1, "rho": 3, "most": 3, "coast": 1, "steady": 1},
+    drone={"J": 3, "K_d": 3},
+)
+"""``most``: angular acceleration; ``coast``: how long silence is made up for, from ``steady`` on."""
+MEMORY = Layout(drone={"past": 3 * _MOST, "acting": 3, "last": 3, "silence": 1})
+"""``past``: torques, newest first; ``acting``: the torque that acts; ``last``: rate that was measured."""
+P, M = PARAMS.at, MEMORY.at
 
 
 @inline
 def _spin(params, c, tx, ty, tz, p, q, r):  # type: ignore[no-untyped-def]
     """Angular acceleration of a drone, body frame, by Euler's equations."""
-    jx, jy, jz = params[c], params[c + 1], params[c + 2]
+    J = c + P.J
+    jx, jy, jz = params[J], params[J + 1], params[J + 2]
     return (
         (tx - (jz - jy) * q * r) / jx,
         (ty - (jx - jz) * r * p) / jy,
@@ -49,21 +55,22 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
     Omega_d = sees.desired_rates
     tau = writes.torques
     n = q.shape[0]
-    past = min(int((params[0] + params[_COAST]) / dt + 1e-9) + 1, _MOST - 1)
-    keep = math.exp(-dt / params[1]) if params[1] > 0.0 else 0.0
-    linger = (1.0 - keep) * params[1] / dt  # mean over a period of what is left of the old torque
+    past = min(int((params[P.delay] + params[P.coast]) / dt + 1e-9) + 1, _MOST - 1)
+    keep = decay(dt, params[P.lag])
+    linger = (
+        (1.0 - keep) * params[P.lag] / dt
+    )  # mean over a period of what is left of the old torque
     for i in range(n):
-        c = _HEAD + 6 * i
-        o = _SLOTS * i
-        act = o + _ACTING
+        c, o = P.rows + P.width * i, M.rows + M.width * i
+        act, was = o + M.acting, o + M.past
         silent = True
         for k in range(3):
-            silent = silent and Omega[i, k] == memory[o + _LAST + k]
-            memory[o + _LAST + k] = Omega[i, k]
-        memory[o + _SILENCE] = memory[o + _SILENCE] + dt if silent else 0.0
-        silence = min(max(memory[o + _SILENCE] - params[_STEADY], 0.0), params[_COAST])
+            silent = silent and Omega[i, k] == memory[o + M.last + k]
+            memory[o + M.last + k] = Omega[i, k]
+        memory[o + M.silence] = memory[o + M.silence] + dt if silent else 0.0
+        silence = min(max(memory[o + M.silence] - params[P.steady], 0.0), params[P.coast])
         # Whole periods of the age of what is measured, and what is left over of one more.
-        span = params[0] + silence
+        span = params[P.delay] + silence
         whole = min(int(span / dt + 1e-9), _MOST - 1)
         rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
         w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
@@ -72,7 +79,7 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
             step = rest if j == whole else dt
             if step > 1e-12:
                 # Half a step of the rates, the turn by the rate in the middle, the whole step.
-                tx, ty, tz = memory[o + 3 * j], memory[o + 3 * j + 1], memory[o + 3 * j + 2]
+                tx, ty, tz = memory[was + 3 * j], memory[was + 3 * j + 1], memory[was + 3 * j + 2]
                 ax, ay, az = _spin(params, c, tx, ty, tz, rx, ry, rz)
                 mx, my, mz = rx + 0.5 * step * ax, ry + 0.5 * step * ay, rz + 0.5 * step * az
                 ax, ay, az = _spin(params, c, tx, ty, tz, mx, my, mz)
@@ -87,19 +94,19 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
         turning = (rx, ry, rz)
         for j in range(past, 0, -1):
             for k in range(3):
-                memory[o + 3 * j + k] = memory[o + 3 * (j - 1) + k]
+                memory[was + 3 * j + k] = memory[was + 3 * (j - 1) + k]
         for k in range(3):
-            J, K_d, most = params[c + k], params[c + 3 + k], params[5 + k]
+            J, K_d, most = params[c + P.J + k], params[c + P.K_d + k], params[P.most + k]
             # No faster towards the wanted attitude than half of the torque can stop.
             cap = math.sqrt(2.0 * most * abs(errors[k]))
-            turn = min(max(params[2 + k] * errors[k], -cap), cap)
+            turn = min(max(params[P.rho + k] * errors[k], -cap), cap)
             limit = J * most
             wanted = min(max(-K_d * (turning[k] - Omega_d[i, k] + turn), -limit), limit)
             # The motors' lag is inverted: at the end of the period acts what is wanted now.
             acting = memory[act + k]
             tau[i, k] = min(max(acting + (wanted - acting) / (1.0 - keep), -limit), limit)
             memory[act + k] = keep * acting + (1.0 - keep) * tau[i, k]
-            memory[o + k] = tau[i, k] + linger * (acting - tau[i, k])
+            memory[was + k] = tau[i, k] + linger * (acting - tau[i, k])
 
 
 class DelayAware(AttitudeControlPart, Delays):
@@ -114,6 +121,7 @@ class DelayAware(AttitudeControlPart, Delays):
     """
 
     kernel = _delay_aware
+    remembers = MEMORY
     gain_setting: ClassVar[str] = "delay"
 
     max_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 40.0
@@ -138,15 +146,10 @@ class DelayAware(AttitudeControlPart, Delays):
         yield from self.delay_warnings(mission, "attitude_control")
 
     def params(self, team: Team) -> Vector:
-        rate = self.bandwidths().rate
         span, lag, coast = (self.delay, self.lag, self.coast) if self.predicted else (0.0, 0.0, 0.0)
-        gains = rate * np.array([1.0, 1.0, YAW])
+        gains = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
         most = [self.max_acceleration, self.max_acceleration, self.max_yaw_acceleration]
-        rows = np.hstack([team.inertias, gains * team.inertias])
-        return np.concatenate([[span, lag], 0.5 * gains, most, [coast, self.steady], rows.ravel()])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(_SLOTS * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, _SLOTS, places)
+        return PARAMS.pack(
+            team.n, delay=span, lag=lag, rho=0.5 * gains, most=most, coast=coast, steady=self.steady,
+            J=team.inertias, K_d=gains * team.inertias,
+        )  # fmt: skip

@@ -9,11 +9,15 @@ from pydantic import Field
 
 from colift.attitude_control.base import SIGNATURE, AttitudeControlPart
 from colift.jit import kernel
+from colift.kernel.layout import Layout
 from colift.math import quaternion
 from colift.part import Vector
 from colift.team import Team
 
 Gain = Annotated[float, Field(gt=0.0)]
+
+PARAMS = Layout(team={"rho": 3, "K_d": 3, "beta": 3, "gamma": 3})
+P = PARAMS.at
 
 
 @kernel(SIGNATURE)
@@ -21,10 +25,8 @@ def _manifold(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     q, Omega, q_d = sees.estimated_attitudes, sees.estimated_rates, sees.desired_attitudes
     Omega_d = sees.desired_rates
     tau = writes.torques
-    rho = params[0:3]
-    K_d = params[3:6]
-    beta = params[6:9]
-    gamma = params[9:12]
+    rho, K_d = params[P.rho : P.rho + 3], params[P.K_d : P.K_d + 3]
+    beta, gamma = params[P.beta : P.beta + 3], params[P.gamma : P.gamma + 3]
     for i in range(q.shape[0]):
         w, ex, ey, ez = quaternion.multiply(
             q_d[i, 0], -q_d[i, 1], -q_d[i, 2], -q_d[i, 3], q[i, 0], q[i, 1], q[i, 2], q[i, 3]
@@ -55,7 +57,7 @@ class Manifold(AttitudeControlPart):
     """Slope of the saturation, s."""
 
     def params(self, team: Team) -> Vector:
-        return np.array([*self.rho, *self.k_d, *self.beta, *self.gamma])
+        return PARAMS.pack(team.n, rho=self.rho, K_d=self.k_d, beta=self.beta, gamma=self.gamma)
 
     def gains(self, team: Team) -> tuple[Vector, Vector, Vector]:
         robust = np.multiply(self.beta, self.gamma)

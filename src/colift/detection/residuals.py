@@ -5,24 +5,35 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.detection.base import SIGNATURE, DetectionPart
 from colift.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.math import quaternion
-from colift.part import Places, Vector, carry_rows
+from colift.math.smooth import decay
+from colift.part import Vector
 from colift.team import Team
 
-# Parameters before the masses: filter, hold, speed, length, time to learn it, deficit, frozen, gravity, astray,
-# tug.
-_HEAD = 10
-_SLOTS = 29
-_LENGTH, _DISTANCE, _SPEED, _V, _P, _CABLE, _THRUST = 1, 2, 3, 4, 7, 10, 11
-_STILL, _LAST = 12, 13  # time without any change; position, velocity, attitude
-# Whether the distance changes faster than that of a taut cable; time in which it did not; the acceleration that
-# lacks (3), and whether it counts as wind for the others.
-_NOW, _STEADY, _LACK, _COUNTS = 23, 24, 25, 28
+PARAMS = Layout(
+    team={
+        "filter": 1, "hold": 1, "speed": 1, "length": 1, "learning": 1, "deficit": 1, "frozen": 1,
+        "g": 1, "astray": 1, "tug": 1,
+    },
+    drone={"m": 1},
+)  # fmt: skip
+MEMORY = Layout(
+    drone={
+        "started": 1, "length": 1, "distance": 1, "speed": 1, "velocity": 3, "expected": 3,
+        "cable": 1, "thrust": 1, "still": 1, "last": 10, "now": 1, "steady": 1, "lack": 3,
+        "counts": 1,
+    }
+)  # fmt: skip
+"""Filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
+``thrust`` last; time without any change (``still``) of position, velocity and attitude (``last``); whether the distance
+changes faster than that of a taut cable (``now``), and time in which it did not (``steady``); the acceleration that lacks
+(``lack``), and whether it ``counts`` as wind for the others."""
+P, M = PARAMS.at, MEMORY.at
 
 BRAKED = 0.8
 """Speed over its filtered value below which the ends of a cable are stopped: it has come taut, and is not cut."""
@@ -37,9 +48,9 @@ def _lacking(i, axis, windy, across, along, memory):  # type: ignore[no-untyped-
     ``windy`` drones count, with the sums ``across`` and ``along`` of what they lack. Where none of the others
     does, all that this one lacks in the level is taken for wind, and its thrust is judged by what lacks upwards.
     """
-    o = _SLOTS * i
-    x, y, z = memory[o + _LACK], memory[o + _LACK + 1], memory[o + _LACK + 2]
-    own = memory[o + _COUNTS]
+    o = M.rows + M.width * i
+    x, y, z = memory[o + M.lack], memory[o + M.lack + 1], memory[o + M.lack + 2]
+    own = memory[o + M.counts]
     rest = windy - own
     if rest < 0.5:
         return z / max(axis[2], LEAST_UP)
@@ -55,14 +66,14 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     thrusts, tensions = sees.thrusts, sees.received_tensions
     carrying = writes.carrying
     n = positions.shape[0]
-    tau, hold, fast, longer = params[0], params[1], params[2], params[3]
-    learn, deficit, frozen, g = params[4], params[5], params[6], params[7]
-    astray, tug = params[8], params[9]
-    keep = math.exp(-dt / tau)
+    hold, fast, longer = params[P.hold], params[P.speed], params[P.length]
+    learn, deficit, g = params[P.learning], params[P.deficit], params[P.g]
+    frozen, astray, tug = params[P.frozen], params[P.astray], params[P.tug]
+    keep = decay(dt, params[P.filter])
     moving = windy = across = along = 0.0
     for i in range(n):
-        o = _SLOTS * i
-        m = params[_HEAD + i]
+        o = M.rows + M.width * i
+        m = params[P.rows + P.width * i + P.m]
         x, y, z = (
             load[0, 0] - positions[i, 0], load[0, 1] - positions[i, 1], load[0, 2] - positions[i, 2]
         )  # fmt: skip
@@ -71,11 +82,11 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         axis = quaternion.third_axis(
             attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
         )
-        if memory[o] == 0.0:
-            memory[o] = 1.0
-            memory[o + _LENGTH] = memory[o + _DISTANCE] = d
+        if memory[o + M.started] == 0.0:
+            memory[o + M.started] = 1.0
+            memory[o + M.length] = memory[o + M.distance] = d
             for k in range(3):
-                memory[o + _V + k] = velocities[i, k]
+                memory[o + M.velocity + k] = velocities[i, k]
         speed = went = 0.0
         for k in range(3):
             speed += alpha[k] * (load[1, k] - velocities[i, k])
@@ -83,26 +94,26 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             if k == 2:
                 expected -= g
             # Both through the same filter: what is new in the speed, over the step, is the filtered acceleration.
-            fresh = (1.0 - keep) * (velocities[i, k] - memory[o + _V + k])
-            memory[o + _P + k] = keep * memory[o + _P + k] + (1.0 - keep) * expected
-            memory[o + _V + k] += fresh
-            memory[o + _LACK + k] = memory[o + _P + k] - fresh / dt
+            fresh = (1.0 - keep) * (velocities[i, k] - memory[o + M.velocity + k])
+            memory[o + M.expected + k] = keep * memory[o + M.expected + k] + (1.0 - keep) * expected
+            memory[o + M.velocity + k] += fresh
+            memory[o + M.lack + k] = memory[o + M.expected + k] - fresh / dt
             went += velocities[i, k] * velocities[i, k]
-        memory[o + _SPEED] = keep * memory[o + _SPEED] + (1.0 - keep) * speed
-        memory[o + _DISTANCE] = keep * memory[o + _DISTANCE] + (1.0 - keep) * d
+        memory[o + M.speed] = keep * memory[o + M.speed] + (1.0 - keep) * speed
+        memory[o + M.distance] = keep * memory[o + M.distance] + (1.0 - keep) * d
 
         # A taut cable keeps its length, which is learned while it does; a slack one says nothing of it.
-        changing = abs(memory[o + _SPEED]) > fast
-        memory[o + _NOW] = 1.0 if changing else 0.0
-        moving += memory[o + _NOW]
-        stretch = memory[o + _DISTANCE] - memory[o + _LENGTH]
-        if abs(memory[o + _SPEED]) < 0.5 * fast and stretch > -longer:
-            memory[o + _STEADY] = min(memory[o + _STEADY] + dt, learn)
-            memory[o + _LENGTH] += dt / memory[o + _STEADY] * stretch
-        known = memory[o + _STEADY] > 0.5 * learn
-        apart = changing and memory[o + _SPEED] > 0.0 and speed > BRAKED * memory[o + _SPEED]
+        changing = abs(memory[o + M.speed]) > fast
+        memory[o + M.now] = 1.0 if changing else 0.0
+        moving += memory[o + M.now]
+        stretch = memory[o + M.distance] - memory[o + M.length]
+        if abs(memory[o + M.speed]) < 0.5 * fast and stretch > -longer:
+            memory[o + M.steady] = min(memory[o + M.steady] + dt, learn)
+            memory[o + M.length] += dt / memory[o + M.steady] * stretch
+        known = memory[o + M.steady] > 0.5 * learn
+        apart = changing and memory[o + M.speed] > 0.0 and speed > BRAKED * memory[o + M.speed]
         apart = apart and known and stretch > longer
-        memory[o + _CABLE] = memory[o + _CABLE] + dt if apart else 0.0
+        memory[o + M.cable] = memory[o + M.cable] + dt if apart else 0.0
 
         still = True
         for k in range(10):
@@ -112,36 +123,37 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 value = velocities[i, k - 3]
             else:
                 value = attitudes[i, k - 6]
-            still = still and value == memory[o + _LAST + k]
-            memory[o + _LAST + k] = value
-        memory[o + _STILL] = memory[o + _STILL] + dt if still else 0.0
-        went = math.sqrt(went) * memory[o + _STILL]
+            still = still and value == memory[o + M.last + k]
+            memory[o + M.last + k] = value
+        memory[o + M.still] = memory[o + M.still] + dt if still else 0.0
+        went = math.sqrt(went) * memory[o + M.still]
 
         # Who is under suspicion says nothing of the wind.
-        trusted = memory[o + _THRUST] == 0.0 and not apart and memory[o + _STILL] <= hold
-        memory[o + _COUNTS] = 1.0 if trusted else 0.0
-        windy += memory[o + _COUNTS]
-        across += memory[o + _COUNTS] * memory[o + _LACK]
-        along += memory[o + _COUNTS] * memory[o + _LACK + 1]
-        if 0.0 < frozen <= memory[o + _STILL] or 0.0 < astray <= went:
+        trusted = memory[o + M.thrust] == 0.0 and not apart and memory[o + M.still] <= hold
+        memory[o + M.counts] = 1.0 if trusted else 0.0
+        windy += memory[o + M.counts]
+        across += memory[o + M.counts] * memory[o + M.lack]
+        along += memory[o + M.counts] * memory[o + M.lack + 1]
+        if 0.0 < frozen <= memory[o + M.still] or 0.0 < astray <= went:
             carrying[i] = 0.0
     for i in range(n):
-        o = _SLOTS * i
-        m = params[_HEAD + i]
+        o = M.rows + M.width * i
+        m = params[P.rows + P.width * i + P.m]
         axis = quaternion.third_axis(
             attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
         )
         lacking = _lacking(i, axis, windy, across, along, memory)
         weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
-        memory[o + _THRUST] = memory[o + _THRUST] + dt if weak else 0.0
+        memory[o + M.thrust] = memory[o + M.thrust] + dt if weak else 0.0
         # If most distances change, it is the load that is seen wrongly, or let go.
-        if memory[o + _CABLE] >= hold and (n == 1 or 2.0 * moving <= n):
+        if memory[o + M.cable] >= hold and (n == 1 or 2.0 * moving <= n):
             carrying[i] = 0.0
         # A drone that falls lets its cable go slack; as long as that is taut, it may pull more than it should.
         loose = (
-            memory[o + _SPEED] < -0.5 * fast or memory[o + _DISTANCE] < memory[o + _LENGTH] - longer
+            memory[o + M.speed] < -0.5 * fast
+            or memory[o + M.distance] < memory[o + M.length] - longer
         )
-        if memory[o + _THRUST] >= (hold if n == 1 or loose else max(hold, tug)):
+        if memory[o + M.thrust] >= (hold if n == 1 or loose else max(hold, tug)):
             carrying[i] = 0.0
 
 
@@ -166,6 +178,7 @@ class Residuals(DetectionPart):
     """
 
     kernel = _judge
+    remembers = MEMORY
 
     filter: Annotated[float, Field(ge=0.002, le=1.0)] = 0.03
     """Time constant of the filters, s."""
@@ -187,11 +200,8 @@ class Residuals(DetectionPart):
     """Time for which thrust must lack on a cable that stays taut, s."""
 
     def params(self, team: Team) -> Vector:
-        head = [self.filter, self.hold, self.speed, self.length, self.learning, self.deficit]
-        return np.array([*head, self.frozen, team.gravity, self.astray, self.tug, *team.masses])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(_SLOTS * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, _SLOTS, places)
+        return PARAMS.pack(
+            team.n, filter=self.filter, hold=self.hold, speed=self.speed, length=self.length,
+            learning=self.learning, deficit=self.deficit, frozen=self.frozen, g=team.gravity,
+            astray=self.astray, tug=self.tug, m=team.masses,
+        )  # fmt: skip

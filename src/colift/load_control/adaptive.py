@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
+from colift.kernel.layout import Layout
 from colift.load_control.base import SIGNATURE, LoadControlPart
 from colift.part import Vector
 from colift.team import Team
@@ -18,7 +18,15 @@ from colift.tuning import LEAN, Delays
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
 
-# memory: learned over told mass, less 1 (so that zero is the start); force against a steady horizontal one (2)
+PARAMS = Layout(
+    team={
+        "m": 1, "g": 1, "k_p": 1, "k_d": 1, "k_i": 1, "learn": 1, "slope": 1, "lower": 1, "upper": 1,
+        "tangent": 1,
+    }
+)  # fmt: skip
+MEMORY = Layout(team={"mass": 1, "lean": 2})
+"""Learned over told mass, less 1, so that zero is the start; force against a steady horizontal one."""
+P, M = PARAMS.at, MEMORY.at
 
 
 @kernel(SIGNATURE)
@@ -26,9 +34,10 @@ def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     dt = now.dt
     load, reference = sees.estimated_load, sees.reference
     u_L = writes.force
-    m, g, k_p, k_d, k_i = params[0], params[1], params[2], params[3], params[4]
-    learn, slope, lower, upper = params[5], params[6], params[7], params[8]
-    tangent = params[9]
+    m, g, k_p, k_d, k_i = params[P.m], params[P.g], params[P.k_p], params[P.k_d], params[P.k_i]
+    learn, slope, tangent = params[P.learn], params[P.slope], params[P.tangent]
+    lower, upper = params[P.lower], params[P.upper]
+    lean = M.lean
     along = 0.0
     for k in range(3):
         e = load[0, k] - reference[0, k]
@@ -36,18 +45,18 @@ def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         regressor = reference[2, k] + (g if k == 2 else 0.0)
         # m_hat' = -gamma (g e3 + xdd_d) . (edot + lambda e)
         along += regressor * (e_dot + slope * e)
-    memory[0] = min(max(memory[0] - dt * learn * along / m, lower - 1.0), upper - 1.0)
-    m_hat = m * (1.0 + memory[0])
-    memory[1] -= dt * k_i * (load[0, 0] - reference[0, 0])
-    memory[2] -= dt * k_i * (load[0, 1] - reference[0, 1])
-    size = math.sqrt(memory[1] * memory[1] + memory[2] * memory[2])
+    memory[M.mass] = min(max(memory[M.mass] - dt * learn * along / m, lower - 1.0), upper - 1.0)
+    m_hat = m * (1.0 + memory[M.mass])
+    memory[lean] -= dt * k_i * (load[0, 0] - reference[0, 0])
+    memory[lean + 1] -= dt * k_i * (load[0, 1] - reference[0, 1])
+    size = math.sqrt(memory[lean] * memory[lean] + memory[lean + 1] * memory[lean + 1])
     if size > tangent * m_hat * g:
-        memory[1] *= tangent * m_hat * g / size
-        memory[2] *= tangent * m_hat * g / size
+        memory[lean] *= tangent * m_hat * g / size
+        memory[lean + 1] *= tangent * m_hat * g / size
     for k in range(3):
         e = load[0, k] - reference[0, k]
         e_dot = load[1, k] - reference[1, k]
-        known = m_hat * g if k == 2 else memory[1 + k]
+        known = m_hat * g if k == 2 else memory[lean + k]
         u_L[k] = known + m_hat * reference[2, k] - k_p * e - k_d * e_dot
     # Keep the cables taut and the formation upright: a force up, within a cone.
     u_L[2] = max(u_L[2], 0.3 * m_hat * g)
@@ -67,6 +76,7 @@ class Adaptive(LoadControlPart, Delays):
     """
 
     kernel = _adaptive
+    remembers = MEMORY
 
     learning: Annotated[float, Field(gt=0.0, le=2.0)] = 0.3
     """Rate at which the mass is learned over the bandwidth of the drones' position loops."""
@@ -88,15 +98,8 @@ class Adaptive(LoadControlPart, Delays):
         stiffness = float(team.masses.sum()) * band.velocity * band.position + k_p
         slope = band.position
         learn = self.learning * stiffness / max(team.gravity, 1e-3) ** 2
-        head = [
-            team.load_mass,
-            team.gravity,
-            k_p,
-            0.5 * k_p / band.position,
-            stiffness * self.leaning * band.position,
-        ]
-        tail = [self.lower, self.upper, math.tan(math.radians(self.max_lean_deg))]
-        return np.array([*head, learn, slope, *tail])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(3)
+        return PARAMS.pack(
+            team.n, m=team.load_mass, g=team.gravity, k_p=k_p, k_d=0.5 * k_p / band.position,
+            k_i=stiffness * self.leaning * band.position, learn=learn, slope=slope,
+            lower=self.lower, upper=self.upper, tangent=math.tan(math.radians(self.max_lean_deg)),
+        )  # fmt: skip

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
+from colift.kernel.layout import Layout
 from colift.load_control.base import SIGNATURE, LoadControlPart
 from colift.part import Vector
 from colift.team import Team
 
 Gain = Annotated[float, Field(ge=0.0)]
+
+PARAMS = Layout(
+    team={
+        "m_L": 1, "g": 1, "k_p": 3, "k_d": 3, "k_i": 3, "limit": 1, "sign": 1, "feed_forward": 1
+    }
+)  # fmt: skip
+MEMORY = Layout(team={"integral": 3})
+P, M = PARAMS.at, MEMORY.at
 
 
 @kernel(SIGNATURE)
@@ -21,19 +29,18 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     load, reference = sees.estimated_load, sees.reference
     u_L = writes.force
     # u_L = m_L (g e3 + xdd_d) - k_p e - k_d edot - k_i int e
-    m_L = params[0]
-    g = params[1]
-    sign = params[12]
+    m_L, g, sign, limit = params[P.m_L], params[P.g], params[P.sign], params[P.limit]
     for k in range(3):
         e = load[0, k] - reference[0, k]
         e_dot = load[1, k] - reference[1, k]
-        memory[k] = min(max(memory[k] + dt * e, -params[11]), params[11])
+        S = M.integral + k
+        memory[S] = min(max(memory[S] + dt * e, -limit), limit)
         gravity = g if k == 2 else 0.0
         u_L[k] = (
-            sign * m_L * (gravity + params[13] * reference[2, k])
-            - params[2 + k] * e
-            - params[5 + k] * e_dot
-            - params[8 + k] * memory[k]
+            sign * m_L * (gravity + params[P.feed_forward] * reference[2, k])
+            - params[P.k_p + k] * e
+            - params[P.k_d + k] * e_dot
+            - params[P.k_i + k] * memory[S]
         )
 
 
@@ -45,6 +52,7 @@ class Pid(LoadControlPart):
     """
 
     kernel = _pid
+    remembers = MEMORY
 
     k_p: tuple[Gain, Gain, Gain] = (8.0, 8.0, 8.0)
     """Proportional gain per world axis, N/m (paper: 8)."""
@@ -60,9 +68,8 @@ class Pid(LoadControlPart):
     """Sign of the feed-forward term."""
 
     def params(self, team: Team) -> Vector:
-        sign = 1.0 if self.sign == "corrected" else -1.0
-        head = [team.load_mass, team.gravity, *self.k_p, *self.k_d, *self.k_i]
-        return np.array([*head, self.integral_limit, sign, self.feed_forward])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(3)
+        return PARAMS.pack(
+            team.n, m_L=team.load_mass, g=team.gravity, k_p=self.k_p, k_d=self.k_d, k_i=self.k_i,
+            limit=self.integral_limit, sign=1.0 if self.sign == "corrected" else -1.0,
+            feed_forward=self.feed_forward,
+        )  # fmt: skip

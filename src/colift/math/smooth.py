@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from colift.jit import inline
+
+
+@inline
+def decay(dt, time_constant):  # type: ignore[no-untyped-def]
+    """Share of its old value that a first-order filter keeps over ``dt``; none without a time constant."""
+    return math.exp(-dt / time_constant) if time_constant > 0.0 else 0.0
 
 
 @inline

@@ -6,6 +6,9 @@ import math
 
 from colift.jit import inline
 
+FOLLOW = 9
+"""Numbers that :func:`follow` keeps: direction, rate, acceleration."""
+
 
 @inline
 def follow(memory, o, tx, ty, tz, omega, dt, reach=math.pi):  # type: ignore[no-untyped-def]

@@ -14,22 +14,23 @@ from numpy.typing import NDArray
 
 from colift.geometry import min_norm_tensions
 from colift.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.math import quaternion
 from colift.part import Places, Vector, carry_rows
-from colift.plant.base import OBSERVE_SIGNATURE, PlantPart, Start
+from colift.plant.base import OBSERVE_SIGNATURE, STATE, PlantPart, Start
 from colift.team import Team
 
-LOAD = 6
-DRONE = 13
-MASS = 2
-"""Where the first drone's numbers stand in the parameters, after load mass and gravity."""
-BODY = 5
-"""Parameters per drone: mass, cable length, inertia (3)."""
+LOAD: int = STATE.at.rows
+DRONE: int = STATE.at.width
+PARAMS = Layout(team={"m_L": 1, "g": 1}, drone={"m": 1, "L": 1, "J": 3})
+MASS: int = PARAMS.at.rows
+BODY: int = PARAMS.at.width
+"""Where the first drone's numbers stand in the parameters, and how many each has."""
 
 
 def state_size(n: int) -> int:
     """Length of the state of load and drones."""
-    return LOAD + DRONE * n
+    return STATE.size(n)
 
 
 @inline
@@ -156,8 +157,10 @@ class BodiesPart(PlantPart):
     observe = observe
 
     def params(self, team: Team) -> Vector:
-        bodies = np.column_stack([team.masses, team.cable_lengths, team.inertias])
-        return np.concatenate([[team.load_mass, team.gravity], bodies.ravel()])
+        return PARAMS.pack(
+            team.n, m_L=team.load_mass, g=team.gravity, m=team.masses, L=team.cable_lengths,
+            J=team.inertias,
+        )  # fmt: skip
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Lengths (n,) of the cables under these tensions, m."""

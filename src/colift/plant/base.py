@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.kernel.layout import Layout
 from colift.kernel.ports import PORTS
 from colift.part import Part
 from colift.team import Team
@@ -32,6 +33,13 @@ and ``catch_impulses`` are raised, never lowered, and ``slack_times`` grow: the 
 recorded row. A cable that comes taut while its ends part with speed ``u`` has a catch of impulse ``u / (1 / m_i + 1 / m_L)``:
 what stops drone and load, were nothing else to hold them.
 """
+
+
+STATE = Layout(
+    team={"load_position": 3, "load_velocity": 3},
+    drone={"position": 3, "velocity": 3, "attitude": 4, "rates": 3},
+)
+"""How the memory of the plants that colift brings begins: the state of load and drones."""
 
 
 @dataclass(frozen=True)

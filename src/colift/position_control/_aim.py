@@ -5,6 +5,9 @@ from __future__ import annotations
 from colift.jit import inline
 from colift.math import quaternion
 
+AIM = 6
+"""Numbers that it remembers of a drone."""
+
 
 @inline
 def aim(i, fresh, dt, keep, u, norm, memory, o, thrusts, attitudes, rates):  # type: ignore[no-untyped-def]

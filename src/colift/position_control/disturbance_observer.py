@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.math import quaternion
 from colift.math.small import solve_symmetric
-from colift.math.sphere import follow
-from colift.part import Places, Vector, carry_rows
-from colift.position_control._aim import aim
+from colift.math.smooth import decay
+from colift.math.sphere import FOLLOW, follow
+from colift.part import Vector
+from colift.position_control._aim import AIM, aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
 from colift.tuning import Delays
@@ -22,23 +23,23 @@ from colift.tuning import Delays
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
 
-# params: g; velocity and position bandwidth; observer bandwidth, its bound over weight; lag of the motors; frequency
-# of the cables; time constant of the thrust's rate; least and most thrust over weight, tangent of the tilt; most
-# acceleration for turning a cable; delay of the attitude; most acceleration of the feedback.
-_HEAD = 14  # then m, L
-# Memory per drone: started; direction, its rate and acceleration; thrust direction and its rate; momentum as far as
-# it is explained; force that is observed; common wind (3 each); thrust that acts.
-_DIRECTION, _RATE, _ACCELERATION, _AIM, _MOMENTUM, _FORCE, _WIND, _THRUST = (
-    1,
-    4,
-    7,
-    10,
-    16,
-    19,
-    22,
-    25,
-)
-_SLOTS = 26
+PARAMS = Layout(
+    team={
+        "g": 1, "velocity": 1, "position": 1, "observer": 1, "observer_limit": 1, "lag": 1,
+        "frequency": 1, "thrust_filter": 1, "min_thrust": 1, "max_thrust": 1, "tangent": 1,
+        "max_swing": 1, "delay": 1, "max_push": 1,
+    },
+    drone={"m": 1, "L": 1},
+)  # fmt: skip
+"""Bandwidths of velocity, position and observer (1/s); forces over weight; tangent of the tilt."""
+MEMORY = Layout(
+    drone={
+        "started": 1, "direction": FOLLOW, "aim": AIM, "momentum": 3, "force": 3, "wind": 3,
+        "thrust": 1,
+    }
+)  # fmt: skip
+"""``momentum``: as far as it is explained; ``force``: what is observed; ``wind``: common; ``thrust``: that acts."""
+P, M = PARAMS.at, MEMORY.at
 
 DOUBT = 0.05
 """Difference from the common wind, over a drone's weight, from which its observation counts for little."""
@@ -47,20 +48,20 @@ DOUBT = 0.05
 @inline
 def _observe(i, v, params, memory, o):  # type: ignore[no-untyped-def]
     """The force that explains the momentum which the known forces do not; bounded, without windup."""
-    m = params[_HEAD + i]
+    m = params[P.rows + P.width * i + P.m]
     size = 0.0
     for k in range(3):
-        if memory[o] == 0.0:
-            memory[o + _MOMENTUM + k] = m * v[i, k]
-        guess = params[3] * (m * v[i, k] - memory[o + _MOMENTUM + k])
-        memory[o + _FORCE + k] = guess
+        if memory[o + M.started] == 0.0:
+            memory[o + M.momentum + k] = m * v[i, k]
+        guess = params[P.observer] * (m * v[i, k] - memory[o + M.momentum + k])
+        memory[o + M.force + k] = guess
         size += guess * guess
-    bound = params[4] * m * params[0]
+    bound = params[P.observer_limit] * m * params[P.g]
     if size > bound * bound:
         shrink = bound / math.sqrt(size)
         for k in range(3):
-            memory[o + _FORCE + k] *= shrink
-            memory[o + _MOMENTUM + k] = m * v[i, k] - memory[o + _FORCE + k] / params[3]
+            memory[o + M.force + k] *= shrink
+            memory[o + M.momentum + k] = m * v[i, k] - memory[o + M.force + k] / params[P.observer]
 
 
 @inline
@@ -84,14 +85,14 @@ def _common_wind(n, params, memory):  # type: ignore[no-untyped-def]
     xx = yy = zz = 1e-6
     xy = xz = yz = bx = by = bz = 0.0
     for i in range(n):
-        o = _SLOTS * i
-        a, d, w = o + _DIRECTION, o + _FORCE, o + _WIND
+        o = M.rows + M.width * i
+        a, d, w = o + M.direction, o + M.force, o + M.wind
         ax, ay, az = memory[a], memory[a + 1], memory[a + 2]
         dx, dy, dz = memory[d], memory[d + 1], memory[d + 2]
         rx, ry, rz = dx - memory[w], dy - memory[w + 1], dz - memory[w + 2]
         along = ax * dx + ay * dy + az * dz
         strange = ax * rx + ay * ry + az * rz
-        scale = DOUBT * params[_HEAD + i] * params[0]
+        scale = DOUBT * params[P.rows + P.width * i + P.m] * params[P.g]
         s = 1.0 / (1.0 + (rx * rx + ry * ry + rz * rz - strange * strange) / (scale * scale))
         xx, yy, zz = xx + s * (1.0 - ax * ax), yy + s * (1.0 - ay * ay), zz + s * (1.0 - az * az)
         xy, xz, yz = xy - s * ax * ay, xz - s * ax * az, yz - s * ay * az
@@ -112,57 +113,59 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
     n = x.shape[0]
-    g = params[0]
-    lag = math.exp(-dt / params[5]) if params[5] > 0.0 else 0.0
-    keep = math.exp(-dt / params[7]) if params[7] > 0.0 else 0.0
-    delay = params[12]
+    g, delay = params[P.g], params[P.delay]
+    lag, keep = decay(dt, params[P.lag]), decay(dt, params[P.thrust_filter])
+    omega = params[P.frequency]
     for i in range(n):
-        o = _SLOTS * i
-        if memory[o] == 0.0:
+        o = M.rows + M.width * i
+        if memory[o + M.started] == 0.0:
             for k in range(3):
-                memory[o + _DIRECTION + k] = alpha[i, k]
-        reach = params[11] / (params[6] * params[6] * params[_HEAD + n + i])
-        follow(memory, o + _DIRECTION, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[6], dt, reach)
+                memory[o + M.direction + k] = alpha[i, k]
+        L = params[P.rows + P.width * i + P.L]
+        reach = params[P.max_swing] / (omega * omega * L)
+        follow(memory, o + M.direction, alpha[i, 0], alpha[i, 1], alpha[i, 2], omega, dt, reach)
         _observe(i, v, params, memory, o)
     wind = _common_wind(n, params, memory)
     for i in range(n):
-        o = _SLOTS * i
-        m, L = params[_HEAD + i], params[_HEAD + n + i]
+        o = M.rows + M.width * i
+        p = P.rows + P.width * i
+        m, L = params[p + P.m], params[p + P.L]
         push = missing = 0.0
         for k in range(3):
-            a, d = memory[o + _DIRECTION + k], memory[o + _FORCE + k]
+            a, d = memory[o + M.direction + k], memory[o + M.force + k]
             x_e = x[i, k] - (reference[0, k] - L * a)
-            v_e = v[i, k] - (reference[1, k] - L * memory[o + _RATE + k])
-            u[i, k] = -params[1] * (v_e + params[2] * x_e)
+            v_e = v[i, k] - (reference[1, k] - L * memory[o + M.direction + 3 + k])
+            u[i, k] = -params[P.velocity] * (v_e + params[P.position] * x_e)
             push += u[i, k] * u[i, k]
             missing += a * (wind[k] - d)
         # No more than the attitude can follow: it needs long to turn from one bank to the other.
-        share = min(1.0, params[13] / math.sqrt(max(push, 1e-12)))
+        share = min(1.0, params[P.max_push] / math.sqrt(max(push, 1e-12)))
         for k in range(3):
-            a, d = memory[o + _DIRECTION + k], memory[o + _FORCE + k]
-            needed = reference[2, k] - L * memory[o + _ACCELERATION + k] + (g if k == 2 else 0.0)
+            a, d = memory[o + M.direction + k], memory[o + M.force + k]
+            needed = reference[2, k] - L * memory[o + M.direction + 6 + k] + (g if k == 2 else 0.0)
             u[i, k] = m * (needed + share * u[i, k]) - T[i] * a - (d + missing * a)
-        _limit(i, u, m * g * params[8], m * g * params[9], params[10])
+        least, most = m * g * params[P.min_thrust], m * g * params[P.max_thrust]
+        _limit(i, u, least, most, params[P.tangent])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
-        fresh = memory[o] == 0.0
-        memory[o] = 1.0
+        fresh = memory[o + M.started] == 0.0
+        memory[o + M.started] = 1.0
         # What will act: the thrust along the axis that is there, not the one that is wanted; and the cable.
-        thrust = norm if fresh else lag * memory[o + _THRUST] + (1.0 - lag) * norm
-        memory[o + _THRUST] = thrust
+        thrust = norm if fresh else lag * memory[o + M.thrust] + (1.0 - lag) * norm
+        memory[o + M.thrust] = thrust
         qw, qx, qy, qz = quaternion.turn(
             q[i, 0], q[i, 1], q[i, 2], q[i, 3],
             Omega[i, 0] * delay, Omega[i, 1] * delay, Omega[i, 2] * delay,
         )  # fmt: skip
         axis = quaternion.third_axis(qw, qx, qy, qz)
         for k in range(3):
-            memory[o + _WIND + k] = wind[k]
-            memory[o + _MOMENTUM + k] += dt * (
+            memory[o + M.wind + k] = wind[k]
+            memory[o + M.momentum + k] += dt * (
                 thrust * axis[k]
-                + T[i] * memory[o + _DIRECTION + k]
-                + memory[o + _FORCE + k]
+                + T[i] * memory[o + M.direction + k]
+                + memory[o + M.force + k]
                 - (m * g if k == 2 else 0.0)
             )
-        aim(i, fresh, dt, keep, u, norm, memory, o + _AIM, thrusts, attitudes, rates)
+        aim(i, fresh, dt, keep, u, norm, memory, o + M.aim, thrusts, attitudes, rates)
 
 
 class DisturbanceObserver(PositionControlPart, Delays):
@@ -177,6 +180,7 @@ class DisturbanceObserver(PositionControlPart, Delays):
     """
 
     kernel = _observe_and_control
+    remembers = MEMORY
 
     observer: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     """Bandwidth of the observer over that of the position loop."""
@@ -202,15 +206,12 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     def params(self, team: Team) -> Vector:
         band = self.bandwidths()
-        head = [team.gravity, band.velocity, band.position]
-        head += [self.observer * band.position, self.observer_limit, self.lag, self.frequency]
-        head += [self.thrust_filter, self.min_thrust, self.max_thrust]
-        head += [math.tan(math.radians(self.max_tilt_deg)), self.max_swing]
-        head += [self.delay if self.predicted else 0.0, self.max_push]
-        return np.concatenate([head, team.masses, team.cable_lengths])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(_SLOTS * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, _SLOTS, places)
+        return PARAMS.pack(
+            team.n, g=team.gravity, velocity=band.velocity, position=band.position,
+            observer=self.observer * band.position, observer_limit=self.observer_limit,
+            lag=self.lag, frequency=self.frequency, thrust_filter=self.thrust_filter,
+            min_thrust=self.min_thrust, max_thrust=self.max_thrust,
+            tangent=math.tan(math.radians(self.max_tilt_deg)), max_swing=self.max_swing,
+            delay=self.delay if self.predicted else 0.0, max_push=self.max_push, m=team.masses,
+            L=team.cable_lengths,
+        )  # fmt: skip

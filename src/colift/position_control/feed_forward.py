@@ -5,20 +5,25 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
-from colift.math.sphere import follow
-from colift.part import Places, Vector, carry_rows
-from colift.position_control._aim import aim
+from colift.kernel.layout import Layout
+from colift.math.smooth import decay
+from colift.math.sphere import FOLLOW, follow
+from colift.part import Vector
+from colift.position_control._aim import AIM, aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
 
 Gain = Annotated[float, Field(ge=0.0)]
 
-_HEAD = 13  # params: g, k_p, k_d, k_i (3 each), limit, frequency, time constant; then m, L
-_SLOTS = 19  # memory per drone: started; integral; direction, rate, acceleration; u_hat, its rate (3 each)
+PARAMS = Layout(
+    team={"g": 1, "k_p": 3, "k_d": 3, "k_i": 3, "limit": 1, "frequency": 1, "thrust_filter": 1},
+    drone={"m": 1, "L": 1},
+)
+MEMORY = Layout(drone={"started": 1, "integral": 3, "alpha": FOLLOW, "aim": AIM})
+P, M = PARAMS.at, MEMORY.at
 
 
 @kernel(SIGNATURE)
@@ -29,37 +34,35 @@ def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
     n = x.shape[0]
-    g = params[0]
-    limit = params[10]
-    keep = math.exp(-dt / params[12]) if params[12] > 0.0 else 0.0
+    g, limit = params[P.g], params[P.limit]
+    keep = decay(dt, params[P.thrust_filter])
     for i in range(n):
-        m_i = params[_HEAD + i]
-        L_i = params[_HEAD + n + i]
-        fresh = memory[_SLOTS * i] == 0.0
-        memory[_SLOTS * i] = 1.0
-        o = _SLOTS * i + 1
-        a = o + 3
+        p, o = P.rows + P.width * i, M.rows + M.width * i
+        m_i, L_i = params[p + P.m], params[p + P.L]
+        fresh = memory[o + M.started] == 0.0
+        memory[o + M.started] = 1.0
+        S, a = o + M.integral, o + M.alpha
         if fresh:
             for k in range(3):
                 memory[a + k] = alpha[i, k]
-        follow(memory, a, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[11], dt)
+        follow(memory, a, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[P.frequency], dt)
         norm = 0.0
         for k in range(3):
             # The drone's place, velocity and acceleration at the end of the filtered cable.
             x_e = x[i, k] - (reference[0, k] - L_i * memory[a + k])
             v_e = v[i, k] - (reference[1, k] - L_i * memory[a + 3 + k])
             acceleration = reference[2, k] - L_i * memory[a + 6 + k]
-            memory[o + k] = min(max(memory[o + k] + dt * x_e, -limit), limit)
+            memory[S + k] = min(max(memory[S + k] + dt * x_e, -limit), limit)
             gravity = g if k == 2 else 0.0
             u[i, k] = (
                 m_i * (gravity + acceleration)
                 - T[i] * memory[a + k]
-                - params[1 + k] * x_e
-                - params[4 + k] * v_e
-                - params[7 + k] * memory[o + k]
+                - params[P.k_p + k] * x_e
+                - params[P.k_d + k] * v_e
+                - params[P.k_i + k] * memory[S + k]
             )
             norm += u[i, k] * u[i, k]
-        aim(i, fresh, dt, keep, u, math.sqrt(norm), memory, o + 12, thrusts, attitudes, rates)
+        aim(i, fresh, dt, keep, u, math.sqrt(norm), memory, o + M.aim, thrusts, attitudes, rates)
 
 
 class FeedForward(PositionControlPart):
@@ -69,6 +72,7 @@ class FeedForward(PositionControlPart):
     """
 
     kernel = _feed_forward
+    remembers = MEMORY
 
     k_p: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
     """Proportional gain per world axis, N/m."""
@@ -84,12 +88,8 @@ class FeedForward(PositionControlPart):
     """Time constant of the derivative of the thrust direction, s."""
 
     def params(self, team: Team) -> Vector:
-        gains = [team.gravity, *self.k_p, *self.k_d, *self.k_i]
-        head = [*gains, self.integral_limit, self.frequency, self.thrust_filter]
-        return np.concatenate([head, team.masses, team.cable_lengths])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(_SLOTS * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, _SLOTS, places)
+        return PARAMS.pack(
+            team.n, g=team.gravity, k_p=self.k_p, k_d=self.k_d, k_i=self.k_i,
+            limit=self.integral_limit, frequency=self.frequency, thrust_filter=self.thrust_filter,
+            m=team.masses, L=team.cable_lengths,
+        )  # fmt: skip

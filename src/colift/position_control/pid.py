@@ -5,19 +5,27 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.jit import kernel
-from colift.part import Places, Vector, carry_rows
-from colift.position_control._aim import aim
+from colift.kernel.layout import Layout
+from colift.math.smooth import decay
+from colift.part import Vector
+from colift.position_control._aim import AIM, aim
 from colift.position_control.base import SIGNATURE, PositionControlPart
 from colift.team import Team
 
 Gain = Annotated[float, Field(ge=0.0)]
 
-_HEAD = 14  # params: g, k_p, k_d, k_i (3 each), limit, two time constants, rates on; then m, L
-_SLOTS = 16  # memory per drone: started; integral, alpha, alpha rate, u_hat, u_hat rate (3 each)
+PARAMS = Layout(
+    team={
+        "g": 1, "k_p": 3, "k_d": 3, "k_i": 3, "limit": 1, "direction_filter": 1, "thrust_filter": 1,
+        "direction_rates": 1,
+    },
+    drone={"m": 1, "L": 1},
+)  # fmt: skip
+MEMORY = Layout(drone={"started": 1, "integral": 3, "alpha": 3, "alpha_rate": 3, "aim": AIM})
+P, M = PARAMS.at, MEMORY.at
 
 
 @kernel(SIGNATURE)
@@ -28,45 +36,44 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
     n = x.shape[0]
-    g = params[0]
-    limit = params[10]
-    keep_alpha = math.exp(-dt / params[11]) if params[11] > 0.0 else 0.0
-    keep_u = math.exp(-dt / params[12]) if params[12] > 0.0 else 0.0
-    rates_on = params[13]
+    g, limit, rates_on = params[P.g], params[P.limit], params[P.direction_rates]
+    keep_alpha = decay(dt, params[P.direction_filter])
+    keep_u = decay(dt, params[P.thrust_filter])
     for i in range(n):
-        m_i = params[_HEAD + i]
-        L_i = params[_HEAD + n + i]
-        fresh = memory[_SLOTS * i] == 0.0
-        memory[_SLOTS * i] = 1.0
-        o = _SLOTS * i + 1
+        p, o = P.rows + P.width * i, M.rows + M.width * i
+        m_i, L_i = params[p + P.m], params[p + P.L]
+        fresh = memory[o + M.started] == 0.0
+        memory[o + M.started] = 1.0
+        S, a, a_dot = o + M.integral, o + M.alpha, o + M.alpha_rate
         norm = 0.0
         for k in range(3):
             # Rate of the wanted direction: first-order filter on the difference quotient.
             if fresh:
-                memory[o + 3 + k] = alpha[i, k]
-            rate = rates_on * (alpha[i, k] - memory[o + 3 + k]) / dt
-            memory[o + 6 + k] = keep_alpha * memory[o + 6 + k] + (1.0 - keep_alpha) * rate
-            memory[o + 3 + k] = alpha[i, k]
+                memory[a + k] = alpha[i, k]
+            rate = rates_on * (alpha[i, k] - memory[a + k]) / dt
+            memory[a_dot + k] = keep_alpha * memory[a_dot + k] + (1.0 - keep_alpha) * rate
+            memory[a + k] = alpha[i, k]
             x_e = x[i, k] - (reference[0, k] - L_i * alpha[i, k])
-            v_e = v[i, k] - (reference[1, k] - L_i * memory[o + 6 + k])
-            memory[o + k] = min(max(memory[o + k] + dt * x_e, -limit), limit)
+            v_e = v[i, k] - (reference[1, k] - L_i * memory[a_dot + k])
+            memory[S + k] = min(max(memory[S + k] + dt * x_e, -limit), limit)
             gravity = g if k == 2 else 0.0
             # u_i = m_i (g e3 + xdd_Ld) - T_id alpha_id - k_p x_e - k_d xdot_e - k_i int x_e
             u[i, k] = (
                 m_i * (gravity + reference[2, k])
                 - T[i] * alpha[i, k]
-                - params[1 + k] * x_e
-                - params[4 + k] * v_e
-                - params[7 + k] * memory[o + k]
+                - params[P.k_p + k] * x_e
+                - params[P.k_d + k] * v_e
+                - params[P.k_i + k] * memory[S + k]
             )
             norm += u[i, k] * u[i, k]
-        aim(i, fresh, dt, keep_u, u, math.sqrt(norm), memory, o + 9, thrusts, attitudes, rates)
+        aim(i, fresh, dt, keep_u, u, math.sqrt(norm), memory, o + M.aim, thrusts, attitudes, rates)
 
 
 class Pid(PositionControlPart):
     """Drone position PID with the paper's gains (paper eqs. 8 to 10)."""
 
     kernel = _pid
+    remembers = MEMORY
 
     k_p: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
     """Proportional gain per world axis, N/m (paper: 40)."""
@@ -86,20 +93,9 @@ class Pid(PositionControlPart):
     """Include the wanted cable directions' rates in the drones' wanted velocities."""
 
     def params(self, team: Team) -> Vector:
-        head = [
-            team.gravity,
-            *self.k_p,
-            *self.k_d,
-            *self.k_i,
-            self.integral_limit,
-            self.direction_filter,
-            self.thrust_filter,
-            float(self.direction_rates),
-        ]
-        return np.concatenate([head, team.masses, team.cable_lengths])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(_SLOTS * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, _SLOTS, places)
+        return PARAMS.pack(
+            team.n, g=team.gravity, k_p=self.k_p, k_d=self.k_d, k_i=self.k_i,
+            limit=self.integral_limit, direction_filter=self.direction_filter,
+            thrust_filter=self.thrust_filter, direction_rates=float(self.direction_rates),
+            m=team.masses, L=team.cable_lengths,
+        )  # fmt: skip
