@@ -25,8 +25,8 @@ def test_what_is_packed_is_found_by_name():
     np.testing.assert_array_equal(LAYOUT.view(packed, "m"), [[0.5], [0.7]])
     LAYOUT.view(packed, "J")[1] = 7.0  # a view, not a copy
     np.testing.assert_array_equal(packed[-3:], 7.0)
-    for same in (LAYOUT.pack(3, g=1.0, k_p=2.0, m=0.5, J=(1.0, 2.0, 3.0)),):
-        np.testing.assert_array_equal(LAYOUT.view(same, "J"), np.tile([1.0, 2.0, 3.0], (3, 1)))
+    alike = LAYOUT.pack(3, g=1.0, k_p=2.0, m=0.5, J=(1.0, 2.0, 3.0))
+    np.testing.assert_array_equal(LAYOUT.view(alike, "J"), np.tile([1.0, 2.0, 3.0], (3, 1)))
 
 
 def test_a_value_that_is_missing_or_unknown_is_named():

@@ -11,6 +11,7 @@ from pydantic import Field
 from colift.actuation.base import SIGNATURE, ActuationPart
 from colift.jit import inline, kernel
 from colift.math import noise
+from colift.math.smooth import decay
 from colift.part import Places, Vector, carry_rows
 from colift.team import Team
 
@@ -72,7 +73,7 @@ def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     saturated_times = writes.saturated_times
     n = thrusts.shape[0]
     lever, ratio, lag, rate = params[0], params[1], params[2], params[3]
-    keep = math.exp(-dt / lag) if lag > 0.0 else 0.0
+    keep = decay(dt, lag)
     now = noise.tick(step, dt)
     for i in range(n):
         o = _SLOTS * i

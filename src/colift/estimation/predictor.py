@@ -14,6 +14,7 @@ from colift.estimation._cables import load_from_drones
 from colift.estimation.base import SIGNATURE, EstimationPart
 from colift.jit import inline, kernel
 from colift.math import quaternion
+from colift.math.smooth import decay
 from colift.part import Places, Vector, carry_rows
 from colift.team import Team
 from colift.tuning import lag_warnings, shorter
@@ -154,7 +155,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     slot = (step // stride) % max(places, 1)
     dt = dt * stride
     g, m_L = params[_GRAVITY], params[_LOAD_MASS]
-    keep = math.exp(-dt / params[_LAG]) if params[_LAG] > 0.0 else 0.0
+    keep = decay(dt, params[_LAG])
     px = py = pz = 0.0
     for i in range(n):
         o = width * (1 + i)

@@ -379,7 +379,7 @@ class Flight:
         log = np.zeros((due_rows(self._step, stop, every.recording), leg.bus.row.size))
         cycles = np.zeros((due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
         begin = time.perf_counter()
-        reached = loop(self._step, stop, every, *leg.circuit.arguments(), log, cycles)
+        reached = loop(self._step, stop, every, *leg.circuit.arguments, log, cycles)
         self.loop_time += time.perf_counter() - begin
         log = log[: due_rows(self._step, reached, every.recording)]
         cycles = cycles[: due_rows(self._step, reached, every.allocation)]

@@ -11,6 +11,8 @@ The loop is compiled when every part is, and runs as plain Python otherwise: sam
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -148,18 +150,20 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
     return last
 
 
-class Circuit(NamedTuple):
+@dataclass(frozen=True)
+class Circuit:
     """All that the loop calls, wired to one bus."""
 
     wires: Any
     disturbances: tuple[Wire, ...]
     common: Any
 
-    @property
+    @cached_property
     def compiled(self) -> bool:
         """Whether every kernel is compiled, and so the loop can be."""
         return all(is_compiled(wire.kernel) for wire in (*self.wires, *self.disturbances))
 
+    @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """As :func:`advance` takes them, compiled or not."""
         if not self.compiled:
