@@ -88,12 +88,12 @@ def test_a_run_loads_the_kernels_of_its_mission_only(flown):
 def test_what_is_compiled_is_loaded_without_the_means_to_compile_which_come_when_needed(
     flown, tmp_path
 ):
-    assert not flown & {"numba.np.arraymath", "numba.np.npyimpl", "scipy.linalg"}
+    assert not flown & {"numba.np.arraymath", "numba.np.npyimpl", "numba.np.arrayobj", "scipy.linalg"}
     program = tmp_path / "program.py"
     program.write_text("""
 import sys
 import numpy as np
-import colift.reference.hover
+import colift.reference.spiral
 before = "numba.np.arraymath" in sys.modules
 from colift.jit import f8, kernel, vector
 @kernel(f8(vector))
@@ -106,6 +106,50 @@ print(before, "numba.np.arraymath" in sys.modules)
         [sys.executable, str(program)], text=True, capture_output=True, check=True, timeout=600
     )
     assert done.stdout.split() == ["False", "True"]
+
+
+@needs_jit
+def test_a_kernel_from_the_cache_can_be_part_of_a_new_one(tmp_path):
+    """Its bitcode is read again when another is compiled with it; what a helper raises is raised."""
+    (tmp_path / "inner.py").write_text("""
+from colift.jit import f8, inline, kernel, vector
+@inline
+def at_least_one(x):
+    if x < 1.0:
+        raise ValueError("too small", x)
+    return x * 2.0
+@kernel(f8(vector))
+def twice(values):
+    return at_least_one(values[0])
+""")
+    outer = """
+from colift.jit import f8, kernel, vector
+from inner import twice
+@kernel(f8(vector))
+def more(values):
+    return twice(values) + {}
+"""
+    program = """
+import sys
+sys.path.insert(0, {folder!r})
+import numpy as np
+import inner, outer
+print(outer.more(np.array([3.0])), sum(inner.twice.stats.cache_hits.values()))
+try:
+    inner.twice(np.array([0.5]))
+except ValueError as error:
+    print(error.args)
+"""
+    said = []
+    for added in ("1.0", "2.0"):
+        (tmp_path / "outer.py").write_text(outer.format(added))
+        done = subprocess.run(
+            [sys.executable, "-c", program.format(folder=str(tmp_path))],
+            env=os.environ | {"COLIFT_CACHE": str(tmp_path / "cache")},
+            text=True, capture_output=True, check=True, timeout=600,
+        )  # fmt: skip
+        said.append(done.stdout.splitlines())
+    assert said == [["7.0 0", "('too small', 0.5)"], ["8.0 1", "('too small', 0.5)"]]
 
 
 def test_help_says_of_each_command_what_its_file_says():

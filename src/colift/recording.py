@@ -247,12 +247,14 @@ def _place(signal: Signal) -> str:
 
 
 def _write(file: Any, name: str, values: Array, signal: Signal) -> None:
-    dataset = file.create_dataset(name, data=values)
-    dataset.attrs["unit"] = signal.unit
-    dataset.attrs["symbol"] = signal.symbol
-    dataset.attrs["frame"] = signal.frame
-    dataset.attrs["meaning"] = signal.meaning
-    dataset.attrs["shape"] = json.dumps(["time", *signal.shape])
+    """One dataset with what there is to say of it, past h5py's own way, which takes three times as long."""
+    from h5py import h5a, h5s, h5t, string_dtype
+
+    dataset = file.create_dataset(name, data=values).id
+    text, one = h5t.py_create(string_dtype(), logical=True), h5s.create(h5s.SCALAR)
+    said = {key: getattr(signal, key) for key in ("unit", "symbol", "frame", "meaning")}
+    for key, value in {**said, "shape": json.dumps(["time", *signal.shape])}.items():
+        h5a.create(dataset, key.encode(), text, one).write(np.array(value, dtype=object))
 
 
 def _read(file: Any) -> Recording:

@@ -252,7 +252,7 @@ class Flight:
         every, n = self._every, self.mission.drones.count
         begin = max(self._legs[0].begin, round(since / every.step))
         first, rows = -(-begin // every.recording), due_rows(begin, self._step, every.recording)
-        arrays = {s.name: np.full((rows, *s.shape_for(n)), np.nan) for s in SIGNALS}
+        arrays = {s.name: np.empty((rows, *s.shape_for(n))) for s in SIGNALS}
         cycles = []
         filled = 0
         for leg in self._legs:
@@ -260,14 +260,16 @@ class Flight:
             cycles.append(answers)
             end = filled + len(log)
             where = columns(leg.team.n)
+            gone = np.setdiff1d(np.arange(n), leg.drones)
             for s in SIGNALS:
                 values = log[:, where[s.name]].reshape(len(log), *s.shape_for(leg.team.n))
-                if s.shape[0] == "n":
-                    arrays[s.name][filled:end, leg.drones] = values
-                elif s.shape[0] == "n+1":
-                    arrays[s.name][filled:end, [*leg.drones, n]] = values
+                rows_of = arrays[s.name][filled:end]
+                if len(gone) == 0 or s.shape[0] not in {"n", "n+1"}:
+                    rows_of[:] = values
                 else:
-                    arrays[s.name][filled:end] = values
+                    rows_of[:, leg.drones] = values[:, : leg.team.n]
+                    rows_of[:, n:] = values[:, leg.team.n :]
+                    rows_of[:, gone] = np.nan
             filled = end
         allocations = np.concatenate(cycles)
         for k, signal in enumerate(CYCLE_SIGNALS):
