@@ -88,7 +88,12 @@ def test_a_run_loads_the_kernels_of_its_mission_only(flown):
 def test_what_is_compiled_is_loaded_without_the_means_to_compile_which_come_when_needed(
     flown, tmp_path
 ):
-    assert not flown & {"numba.np.arraymath", "numba.np.npyimpl", "numba.np.arrayobj", "scipy.linalg"}
+    assert not flown & {
+        "numba.np.arraymath",
+        "numba.np.npyimpl",
+        "numba.np.arrayobj",
+        "scipy.linalg",
+    }
     program = tmp_path / "program.py"
     program.write_text("""
 import sys

@@ -28,7 +28,7 @@ from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import types
 from numba.core import caching, cgutils, event
-from numba.core.runtime import _nrt_python as _nrt
+from numba.core.runtime.nrt import _nrt
 from numba.extending import intrinsic, overload
 
 config: Any = numba.config
@@ -134,7 +134,7 @@ class _Kept(caching.CompileResultCacheImpl):
     """
 
     def reduce(self, cres: Any) -> Any:
-        (name, kind, (code, bitcode)), *rest, environments = super().reduce(cres)
+        (name, kind, (code, bitcode)), *rest, environments = super().reduce(cres)  # type: ignore[no-untyped-call]
         own = cres.fndesc
         functions = (own.llvm_func_name, own.llvm_cpython_wrapper_name, own.llvm_cfunc_wrapper_name)
         stand_in = llvm.parse_assembly(
@@ -147,7 +147,7 @@ class _Kept(caching.CompileResultCacheImpl):
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
         kept, bitcode = payload
-        made = super().rebuild(target_context, kept)
+        made = super().rebuild(target_context, kept)  # type: ignore[no-untyped-call]
         library = made.library
 
         def for_linking() -> Any:
@@ -165,7 +165,8 @@ class _Cache(caching.FunctionCache):
     _impl_class = _Kept
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        for name, address in _nrt.c_helpers.items():  # of the refresh left out, what running code needs
+        # Of the refresh that is left out, what running code needs.
+        for name, address in _nrt.c_helpers.items():
             llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
