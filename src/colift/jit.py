@@ -28,7 +28,7 @@ from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import types
 from numba.core import caching, cgutils, event
-from numba.core.runtime.nrt import _nrt
+from numba.core.runtime import _nrt_python as _nrt  # type: ignore[attr-defined]
 from numba.extending import intrinsic, overload
 
 config: Any = numba.config
