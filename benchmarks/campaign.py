@@ -15,9 +15,9 @@ import statistics
 import tempfile
 from pathlib import Path
 
-from colift.campaign import engine
-from colift.campaign.plan import Case, plan
-from colift.campaign.workers import cores
+from colift.study.campaign import engine
+from colift.study.campaign.plan import Case, plan
+from colift.study.campaign.workers import cores
 
 
 def campaign(cases: list[Case], workers: int) -> tuple[float, list[float]]:

@@ -16,11 +16,11 @@ from pathlib import Path
 import aiohttp
 
 from colift.errors import ColiftError
-from colift.live.pilot import Pilot
-from colift.live.server import Server
-from colift.live.session import Session
 from colift.mission import load_mission
-from colift.recording import Recording
+from colift.record.recording import Recording
+from colift.show.live.pilot import Pilot
+from colift.show.live.server import Server
+from colift.show.live.session import Session
 
 PAGES = (0, 1, 5)
 

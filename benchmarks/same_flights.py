@@ -20,16 +20,13 @@ from typing import Any
 
 WORKER = """
 import json, sys
-from colift.catalogue import mission_names
-from colift.metrics import compute
-from colift.mission import load_mission
-from colift.simulation.flight import Flight
+import colift
+from colift.mission import mission_names
 sys.stdout.write(json.dumps(sorted(mission_names())) + "\\n"); sys.stdout.flush()
 for line in sys.stdin:
-    flight = Flight(load_mission(line.strip()))
-    recording = flight.run()
-    found = {name: float(value).hex() for name, value in compute(recording).items() if not name.endswith("_us")}
-    sys.stdout.write(json.dumps([flight.loop_time, found]) + "\\n"); sys.stdout.flush()
+    run = colift.run(line.strip())
+    found = {name: float(value).hex() for name, value in run.metrics.items() if not name.endswith("_us")}
+    sys.stdout.write(json.dumps([run.loop_time, found]) + "\\n"); sys.stdout.flush()
 """
 
 

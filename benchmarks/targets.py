@@ -20,9 +20,9 @@ from pathlib import Path
 
 from rich.table import Table
 
-from colift.benchmark.problems import FAMILIES, NAMES
-from colift.benchmark.tables import own, ratio
 from colift.cli.base import out
+from colift.study.bench.problems import FAMILIES, NAMES
+from colift.study.bench.tables import own, ratio
 
 
 def whole_process(arguments: list[str], cache: str | None = None) -> float:

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from colift.allocation.base import AllocatorPart, Status
+from colift.control.allocation.base import AllocatorPart, Status
 
 
 def share(now, sees, params, memory, writes):

@@ -10,19 +10,19 @@ import sys
 import numpy as np
 import pytest
 
-from colift import benchmark
-from colift.allocation.base import Allocator
-from colift.benchmark import instructions, problems, solvers, tables, timing
-from colift.benchmark.problems import Problem
-from colift.benchmark.referee import TOLERANCES, judge
+from colift.control.allocation.base import Allocator
 from colift.errors import ColiftError
+from colift.study import bench as benchmark
+from colift.study.bench import instructions, problems, solvers, tables, timing
+from colift.study.bench.problems import Problem
+from colift.study.bench.referee import TOLERANCES, judge
 
 SIZES = (2, 3, 4, 16)
 
 
 @pytest.mark.parametrize("n", [3, 4, 16, 1024])
 def test_the_problem_keeps_the_papers_cone(n) -> None:
-    from colift.allocation._sqp_newton import optimal_alignment
+    from colift.control.allocation.paper.newton import optimal_alignment
 
     mass, mu = problems.scaled_problem(n)
     share = optimal_alignment(n, mu / (mass * 9.81) ** 2) / n

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from colift.recording import Recording
+from colift.record.recording import Recording
 
 SHORT = ("--set", "timing.duration=1.0", "--no-report")
 
@@ -144,7 +144,7 @@ def test_help_teaches() -> None:
 
 def test_an_allocator_in_a_file_of_ones_own_flies(tmp_path: Path) -> None:
     (tmp_path / "halves.py").write_text(
-        "from colift.allocation.base import AllocatorPart\n"
+        "from colift.control.allocation.base import AllocatorPart\n"
         "def share(now, sees, params, memory, writes):\n"
         "    writes.desired_tensions[:] = abs(sees.force[2]) / len(writes.desired_tensions)\n"
         "    writes.desired_directions[:] = (0.0, 0.0, -1.0)\n"
@@ -197,8 +197,8 @@ def test_the_version_and_a_summary_in_words(tmp_path: Path) -> None:
         ("import nowhere_at_all", "nowhere_at_all"),
         ("x = 1", "holds no class"),
         (
-            "from colift.jit import kernel, void, f8\n"
-            "from colift.allocation.base import AllocatorPart\n"
+            "from colift.kernel.jit import kernel, void, f8\n"
+            "from colift.control.allocation.base import AllocatorPart\n"
             "@kernel(void(f8))\ndef share(x):\n    pass\n"
             "class Wrong(AllocatorPart):\n    kernel = share\n",
             "signature",

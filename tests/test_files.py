@@ -62,7 +62,7 @@ def test_without_room_the_flight_is_told_all_the_same(tmp_path: Path) -> None:
 def test_without_room_for_the_cache_kernels_are_compiled_for_once(tmp_path: Path) -> None:
     (tmp_path / "made.py").write_text(
         "import resource\n"
-        "from colift.jit import f8, kernel\n"
+        "from colift.kernel.jit import f8, kernel\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n\n"
         "@kernel(f8(f8))\n"
         "def twice(x):\n"

@@ -15,8 +15,8 @@ from colift.interrupts import heard
 
 SWALLOWS = """
 import os, signal
-from colift.allocation.base import AllocatorPart
-from colift.geometry import ring
+from colift.control.allocation.base import AllocatorPart
+from colift.team.geometry import ring
 
 def solve(now, sees, params, memory, writes):
     "Calls back as a library does that takes any error of a callback for a failed evaluation."
@@ -107,7 +107,7 @@ def test_a_flight_ends_although_its_solver_swallows_the_interrupt(tmp_path: Path
 IPOPT = """
 import os, signal, threading, time
 import numpy as np
-from colift.allocation.base import Allocator
+from colift.control.allocation.base import Allocator
 from colift.part import find
 
 asked = Allocator(find("allocation", "ipopt")(), 4)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from colift import jit
+from colift.kernel import jit
 
 
 @pytest.fixture(autouse=True)

@@ -15,14 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import colift
-from colift import judgement
-from colift.allocation.base import Status
+from colift.control.allocation.base import Status
 from colift.errors import ColiftError, MissionError
-from colift.geometry import ring
-from colift.judgement import ACTUAL, ON_BOARD, Answers, judge, parts_for
-from colift.recording import Recording
-from colift.report.judgement import write_page
+from colift.record.recording import Recording
+from colift.show.report.judgement import write_page
+from colift.study import judge as judgement
+from colift.study.judge import ACTUAL, ON_BOARD, Answers, judge, parts_for
 from colift.team import Team
+from colift.team.geometry import ring
 
 QUICK = ("safe", "sqp", "ring", "min-norm", "internal-force")
 

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from colift import latency
-from colift.allocation.sqp import Sqp
+from colift.control.allocation.sqp import Sqp
+from colift.study import latency
 from colift.team import Team
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import colift
-from colift.live.endless import flown_mission
+from colift.flight.flight import Flight
 from colift.mission.load import load_mission
-from colift.moments import KINDS, Moment, Watch, find_moments
-from colift.recording import Recording
-from colift.report.marks import MARKS
-from colift.simulation.flight import Flight
+from colift.record.moments import KINDS, Moment, Watch, find_moments
+from colift.record.recording import Recording
+from colift.show.live.endless import flown_mission
+from colift.show.report.marks import MARKS
 
 
 def fly(mission: str = "paper-spiral", duration: float = 2.0, **tables: Any) -> Recording:

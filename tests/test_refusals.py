@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import colift
-from colift.allocation.base import Allocator
-from colift.allocation.ring import Ring
-from colift.allocation.safe import Safe
+from colift.control.allocation.base import Allocator
+from colift.control.allocation.ring import Ring
+from colift.control.allocation.safe import Safe
 from colift.errors import (
     ColiftError,
     MissionError,
@@ -18,8 +18,8 @@ from colift.errors import (
     SettingError,
     UnknownNameError,
 )  # fmt: skip
+from colift.flight.flight import Flight
 from colift.part import find, make
-from colift.simulation.flight import Flight
 from colift.team import Team
 
 NAN, INF = float("nan"), float("inf")

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import colift
-from colift import metrics
 from colift.mission import load_mission, mission_names
-from colift.moments import KINDS
-from colift.recording import Recording
-from colift.report import comparison, figures, html, marks, panels, render, style
+from colift.record import metrics
+from colift.record.moments import KINDS
+from colift.record.recording import Recording
+from colift.show.report import comparison, figures, html, marks, panels, render, style
 
 
 def fly(mission: str = "paper-spiral", **settings: object) -> Recording:

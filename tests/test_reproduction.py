@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colift import reproduction
-from colift.geometry import pairwise_angles
+from colift.flight.runner import run
 from colift.mission.load import parse_override
-from colift.runner import run
+from colift.show.report.reproduction import write_page
+from colift.study import reproduction
+from colift.team.geometry import pairwise_angles
 
 
 @pytest.fixture(scope="module")
@@ -187,10 +188,9 @@ def test_verdicts_follow_the_numbers() -> None:
 
 
 def test_the_table_is_written_whole(result: reproduction.Reproduction, tmp_path: Path) -> None:
-    files = reproduction.write(result, tmp_path)
-    table = json.loads(files["table"].read_text())
+    table = json.loads(reproduction.write(result, tmp_path).read_text())
     assert len(table["rows"]) == len(result.rows)
-    page = files["report"].read_text()
+    page = write_page(result, tmp_path).read_text()
     assert page.count("<figure>") == 7
     assert "http" not in page.replace("http://www.w3.org/", "")
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import colift
-from colift import safety
-from colift.allocation import Status
-from colift.allocation.sqp import Sqp
-from colift.geometry import pairwise_angles
+from colift.control.allocation.sqp import Sqp
+from colift.kernel.status import Status
 from colift.mission import mission_names
+from colift.study import safety
+from colift.team.geometry import pairwise_angles
 
 
 @pytest.mark.parametrize("family", safety.FAMILIES)

@@ -15,8 +15,9 @@ import pytest
 from packaging.requirements import Requirement
 
 import colift
-from colift import catalogue, extras, jit
+from colift import catalogue, extras
 from colift.cli import _commands
+from colift.kernel import jit
 from colift.part import find
 
 ROOT = Path(__file__).parents[1]
@@ -51,7 +52,7 @@ def test_help_imports_nothing_heavy():
 def test_list_imports_neither_kernels_nor_numbers():
     found = modules_after("list")
     assert not found & HEAVY
-    assert not found & {"colift.part", "colift.jit", "colift.mission.load"}
+    assert not found & {"colift.part", "colift.kernel.jit", "colift.mission.load"}
 
 
 def test_a_command_imports_itself_alone():
@@ -76,11 +77,11 @@ def test_a_run_without_report_draws_nothing(flown):
 def test_a_run_loads_the_kernels_of_its_mission_only(flown):
     kernels = {
         name for name in flown
-        if (parts := name.split("."))[0] == "colift" and len(parts) == 3
-        and parts[1] in catalogue.FOLDERS and not parts[2].startswith("_") and parts[2] != "base"
+        if (parts := name.split("."))[0] == "colift" and len(parts) == 4
+        and parts[2] in catalogue.FOLDERS and not parts[3].startswith("_") and parts[3] != "base"
     }  # fmt: skip
-    assert "colift.allocation.sqp" in kernels
-    assert "colift.allocation.safe" not in kernels
+    assert "colift.control.allocation.sqp" in kernels
+    assert "colift.control.allocation.safe" not in kernels
     assert len(kernels) <= 15
 
 
@@ -98,9 +99,9 @@ def test_what_is_compiled_is_loaded_without_the_means_to_compile_which_come_when
     program.write_text("""
 import sys
 import numpy as np
-import colift.reference.spiral
+import colift.control.reference.spiral
 before = "numba.np.arraymath" in sys.modules
-from colift.jit import f8, kernel, vector
+from colift.kernel.jit import f8, kernel, vector
 @kernel(f8(vector))
 def total(values):
     return np.sum(np.sort(values)) + len([v for v in values if v > 1.0])
@@ -117,7 +118,7 @@ print(before, "numba.np.arraymath" in sys.modules)
 def test_a_kernel_from_the_cache_can_be_part_of_a_new_one(tmp_path):
     """Its bitcode is read again when another is compiled with it; what a helper raises is raised."""
     (tmp_path / "inner.py").write_text("""
-from colift.jit import f8, inline, kernel, vector
+from colift.kernel.jit import f8, inline, kernel, vector
 @inline
 def at_least_one(x):
     if x < 1.0:
@@ -128,7 +129,7 @@ def twice(values):
     return at_least_one(values[0])
 """)
     outer = """
-from colift.jit import f8, kernel, vector
+from colift.kernel.jit import f8, kernel, vector
 from inner import twice
 @kernel(f8(vector))
 def more(values):
@@ -202,7 +203,7 @@ print(json.dumps([told, done.compiled, done.loaded, again.compiled, again.loaded
         assert done.stderr == ""  # a library prints nothing
         runs.append(json.loads(done.stdout))
     first, second = runs
-    call, own = "allocation.base.ask", "allocation.min_norm.allocate"
+    call, own = "control.allocation.base.ask", "control.allocation.min_norm.allocate"
     assert first == [[[0.0, call], [0.0, own], [1.0, ""]], [call, own], 0, [], 0]
     assert second == [[[1.0, ""]], [], 2, [], 0]
 
@@ -218,7 +219,7 @@ def test_compile_says_how_much_it_did_and_is_done_when_all_is_there(tmp_path):
         for _ in range(2)
     ]  # fmt: skip
     assert [(each["compiled"], each["loaded"]) for each in done] == [
-        (["allocation.base.ask", "allocation.min_norm.allocate"], 0), ([], 2),
+        (["control.allocation.base.ask", "control.allocation.min_norm.allocate"], 0), ([], 2),
     ]  # fmt: skip
 
 
@@ -226,7 +227,7 @@ def test_compile_says_how_much_it_did_and_is_done_when_all_is_there(tmp_path):
 def test_what_a_mission_needs_is_there_after_it_was_warmed():
     script = """
 import colift
-from colift import jit
+from colift.kernel import jit
 mission = {"name": "x", "reference": {"kind": "hover"}, "plant": {"kind": "slack-cables"},
            "disturbance": [{"kind": "wind"}], "timing": {"duration": 0.1},
            "events": [{"at": 0.05, "field": "allocation.kind", "value": "sqp"}]}
@@ -255,7 +256,7 @@ for path in root.rglob("*.py"):
     done = subprocess.run(
         [sys.executable, "-c", script], text=True, capture_output=True, check=True, timeout=900
     )
-    assert done.stdout.split() == ["colift.benchmark._under_valgrind"]
+    assert done.stdout.split() == ["colift.study.bench._under_valgrind"]
 
 
 def test_what_cannot_be_warmed_is_refused():

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import colift
-from colift import jit
-from colift.allocation.base import Allocator
+from colift.control.allocation.base import Allocator
+from colift.flight.flight import Flight
+from colift.kernel import jit
 from colift.part import find
-from colift.simulation.flight import Flight
 
 needs_jit = pytest.mark.skipif(not jit.JIT_ENABLED, reason="compiled kernels only")
 KINDS = ("safe", "sqp", "min-norm", "internal-force", "ring", "lopsided")
@@ -96,7 +96,7 @@ def test_threads_may_load_different_kernels_at_once():
 import threading
 from importlib import import_module
 from pathlib import Path
-from colift import jit
+from colift.kernel import jit
 before = jit.config.CACHE_DIR
 names = ["reference.hover", "allocation.sqp", "link.radio", "disturbance.gust", "sensing.noisy", "math.noise"]
 start = threading.Barrier(len(names))

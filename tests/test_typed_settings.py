@@ -10,12 +10,12 @@ from typing import get_type_hints
 import pytest
 
 import colift
-from colift.allocation.safe import Safe, SafeSettings
-from colift.allocation.sqp import Sqp, SqpSettings
+from colift.control.allocation.safe import Safe, SafeSettings
+from colift.control.allocation.sqp import Sqp, SqpSettings
 
 PROGRAM = """\
 import colift
-from colift.allocation.safe import Safe
+from colift.control.allocation.safe import Safe
 
 allocator = colift.SafeAllocator(n=4, min_angel_deg=30)  # line 4
 colift.SqpAllocator(4, 0.15, tolerence=1e-9)  # line 5

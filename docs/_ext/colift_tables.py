@@ -16,8 +16,8 @@ from sphinx.util.docutils import SphinxDirective
 from colift.catalogue import DEFAULT_KINDS
 from colift.kernel.ports import PORTS
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, Signal
-from colift.metrics import all_metrics
 from colift.mission import Mission, schema
+from colift.mission.criteria import METRICS
 from colift.part import FOLDERS, find, names
 from colift.team import Team
 from colift.wording import meanings
@@ -187,7 +187,7 @@ class MetricTable(SphinxDirective):
     """Every metric of a flight."""
 
     def run(self) -> list[nodes.Node]:
-        rows = [[code(m.name), m.unit, m.meaning] for m in all_metrics()]
+        rows = [[code(m.name), m.unit, m.meaning] for m in METRICS]
         return [table(["metric", "unit", "meaning"], rows)]
 
 

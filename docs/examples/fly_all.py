@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import colift
-from colift.allocation.base import Allocator
+from colift.control.allocation.base import Allocator
 from colift.part import load_file
 
 here = Path(__file__).parent

@@ -10,8 +10,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from colift.allocation.base import SIGNATURE, AllocatorPart
-from colift.jit import kernel
+from colift.control.allocation.base import SIGNATURE, AllocatorPart
+from colift.kernel.jit import kernel
 
 
 @kernel(SIGNATURE)  # delete this line and the same code runs as plain Python

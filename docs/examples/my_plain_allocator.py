@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from colift.allocation.base import AllocatorPart
+from colift.control.allocation.base import AllocatorPart
 
 
 def equal_share(now, sees, params, memory, writes):

@@ -9,9 +9,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from colift.jit import kernel
-from colift.plant.base import STATE, STEP_SIGNATURE
-from colift.plant.rigid_cables import RigidCables
+from colift.kernel.jit import kernel
+from colift.world.plant.base import STATE, STEP_SIGNATURE
+from colift.world.plant.rigid_cables import RigidCables
 
 rigid_step = RigidCables.kernel
 S = STATE.at

@@ -5,9 +5,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from colift.jit import kernel
+from colift.control.reference.base import SIGNATURE, ReferencePart
+from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
-from colift.reference.base import SIGNATURE, ReferencePart
 
 PARAMS = Layout(team={"height": 1, "amplitude": 1, "rate": 1})
 P = PARAMS.at

@@ -1,7 +1,7 @@
 """Forces given up although the limits allowed them (docs/theory/safe.md): ``python docs/figures/avoidable.py [--fly]``.
 
 From ``avoidable.json`` beside this file. With ``--fly`` it is measured first, some minutes, and needs the extra ``ipopt``:
-five families of forces (``colift.safety``) for teams of 2 to 24, at the defaults and with other periods, tension limits
+five families of forces (``colift.study.safety``) for teams of 2 to 24, at the defaults and with other periods, tension limits
 and ``spread``. A cycle that misses more than 1e-8 N is judged in two steps: a plane may prove that no cables within
 the limits give that force; where none does, IPOPT looks from several starts for tensions and directions that do, within
 every limit of the cycle (tension, cone, turn from the last directions, pairs), to 1e-8 N. If it finds some, the miss
@@ -13,9 +13,9 @@ import math
 import numpy as np
 from pages import fill, stored, table
 
-from colift import safety
-from colift.allocation._reach import out_of_reach
-from colift.math import shares
+from colift.control.allocation.limits.reach import out_of_reach
+from colift.kernel.math import shares
+from colift.study import safety
 
 SIZES = (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
 CASES = {

@@ -8,10 +8,10 @@ ends of the cable part no more.
 import numpy as np
 from pages import fill, table
 
-from colift import metrics
+from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.part import find, names
-from colift.simulation.flight import Flight
+from colift.record import metrics
 
 MISSION = {
     "name": "drop-and-catch",

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from pages import fill, table
 
-from colift.campaign.judge import CRITERIA
-from colift.math import shares
+from colift.kernel.math import shares
+from colift.study.campaign.judge import CRITERIA
 
 RESULTS = Path(__file__).with_suffix(".json")
 ARGUMENTS = ["--seeds", "3", "--first-seed", "1000"]

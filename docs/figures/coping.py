@@ -15,8 +15,8 @@ import numpy as np
 from pages import fill, stored, table
 
 import colift
-from colift.campaign import stress
-from colift.math import shares
+from colift.kernel.math import shares
+from colift.study import stress
 
 Overrides = dict[str, Any]
 

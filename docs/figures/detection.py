@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from pages import fill, stored, table
 
-from colift import survival
-from colift.math import shares
+from colift.flight.flight import Flight
+from colift.kernel.math import shares
 from colift.mission import load_mission
-from colift.simulation.flight import Flight
+from colift.study import survival
 
 SEEDS = range(1000, 1040)
 WINDS = (0.0, 5.0, 10.0)

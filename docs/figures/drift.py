@@ -8,7 +8,7 @@ and the largest gap to the global optimum: every answer is optimal.
 import numpy as np
 
 import colift
-from colift.geometry import pairwise_angles
+from colift.team.geometry import pairwise_angles
 
 for mu in (0.15, 0.75, 1.35):
     for transport in (False, True):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from pages import fill, table
 
-from colift import reproduction
-from colift.geometry import pairwise_angles, ring
+from colift.study import reproduction
+from colift.team.geometry import pairwise_angles, ring
 
 WEIGHT = reproduction.WEIGHT
 

@@ -15,11 +15,11 @@ from unittest import mock
 import numpy as np
 from pages import fill, stored, table
 
-from colift.actuation.motors import Motors
-from colift.allocation import _feasibility
-from colift.allocation.safe import Safe
-from colift.math import shares
+from colift.control.allocation.limits import feasibility as feasibility_of
+from colift.control.allocation.safe import Safe
+from colift.kernel.math import shares
 from colift.team import Team
+from colift.world.actuation.motors import Motors
 
 SEED = 20260
 TEAMS = 200
@@ -170,15 +170,15 @@ def by_ipopt(team, safe, motors, rng, starts=STARTS):
 def by_colift(team, safe, motors):
     """The heaviest load of ``feasibility``, N, its formation's largest miss, and what all of it took of the processor, s."""
     found = []
-    search = _feasibility.extreme
+    search = feasibility_of.extreme
 
     def watched(*given, **named):
         found.append(search(*given, **named))
         return found[-1]
 
     began = time.process_time()
-    with mock.patch.object(_feasibility, "extreme", watched):
-        judged = _feasibility.feasibility(team, safe, motors)
+    with mock.patch.object(feasibility_of, "extreme", watched):
+        judged = feasibility_of.feasibility(team, safe, motors)
     took = time.process_time() - began
     miss = 0.0
     if judged.heaviest > 0.0:

@@ -11,8 +11,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 
-from colift.allocation.sqp import Sqp
-from colift.geometry import pairwise_angles
+from colift.control.allocation.sqp import Sqp
+from colift.team.geometry import pairwise_angles
 
 WEIGHT = 0.225 * 9.81
 MUS = (0.15, 0.75, 1.35)

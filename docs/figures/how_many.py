@@ -7,7 +7,7 @@ import math
 
 from pages import fill, stored, table
 
-from colift.allocation._feasibility import most_cables
+from colift.control.allocation.limits.feasibility import most_cables
 
 CONES = (45, 60, 75)
 ANGLES = (15, 20, 30, 40, 60)

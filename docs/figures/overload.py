@@ -9,9 +9,9 @@ are level, those of the other half lie anywhere above.
 import numpy as np
 from pages import fill, stored, table
 
-from colift import safety
-from colift.allocation.base import INFO_SIZE, Status
-from colift.geometry import pairwise_angles
+from colift.control.allocation.base import INFO_SIZE, Status
+from colift.study import safety
+from colift.team.geometry import pairwise_angles
 
 SIZES = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24)
 DIRECTIONS = 20

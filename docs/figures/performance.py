@@ -13,8 +13,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 
-from colift import latency
-from colift.benchmark.tables import TITLES, notes, own, ratio, sizes, tables
+from colift.study import latency
+from colift.study.bench.tables import TITLES, notes, own, ratio, sizes, tables
 
 HERE = Path(__file__).parent
 MEASUREMENTS = {

@@ -7,9 +7,9 @@ relative to that with a millionth of it, in hover at rest and along a smooth for
 import numpy as np
 from pages import fill, stored, table
 
-from colift import safety
-from colift.allocation import _safe_cycle as cycle
-from colift.allocation.base import Allocator
+from colift.control.allocation.base import Allocator
+from colift.control.allocation.limits import cycle
+from colift.study import safety
 
 CASES = {
     "defaults": {},

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import colift
-from colift import safety
-from colift.allocation.base import Allocator
-from colift.allocation.sqp import Sqp
-from colift.geometry import pairwise_angles
+from colift.control.allocation.base import Allocator
+from colift.control.allocation.sqp import Sqp
+from colift.study import safety
+from colift.team.geometry import pairwise_angles
 
 TEAMS = (3, 4, 6, 8, 12, 16)
 SECONDS = 60.0

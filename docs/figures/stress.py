@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pages import DOCS, fill, table
 
-from colift.math import shares
+from colift.kernel.math import shares
 
 RESULTS = Path(__file__).with_suffix(".json")
 FIRST_SEED = 1000

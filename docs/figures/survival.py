@@ -12,8 +12,8 @@ from pathlib import Path
 
 from pages import fill, table
 
-from colift import survival
-from colift.math import shares
+from colift.kernel.math import shares
+from colift.study import survival
 
 RESULTS = Path(__file__).with_suffix(".json")
 

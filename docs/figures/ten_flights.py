@@ -9,9 +9,9 @@ from pathlib import Path
 
 from pages import fill, stored, table
 
-from colift import judgement
-from colift.judgement.asking import ACTUAL, ON_BOARD
-from colift.judgement.tables import shown, summary
+from colift.study import judge as judgement
+from colift.study.judge.asking import ACTUAL, ON_BOARD
+from colift.study.judge.tables import shown, summary
 
 LEFT_OUT = ("ipopt", "slsqp")
 """Of the table of angles: they solve the problem of `sqp`."""

@@ -9,9 +9,9 @@ import math
 from pages import fill, stored, table
 
 import colift
-from colift.allocation.wahba_hoenig import WahbaHoenig
-from colift.geometry import pairwise_angles, ring
+from colift.control.allocation.wahba_hoenig import WahbaHoenig
 from colift.team import Team
+from colift.team.geometry import pairwise_angles, ring
 
 TEAMS = (2, 4, 7, 16)
 DISTANCES = (0.2, 0.5, 0.8, 1.1)

@@ -7,7 +7,7 @@ the widest formation that a local search from random members finds.
 import numpy as np
 from scipy.optimize import minimize
 
-from colift.geometry import pairwise_angles, ring
+from colift.team.geometry import pairwise_angles, ring
 
 WEIGHT, MU = 0.225 * 9.81, 0.15
 

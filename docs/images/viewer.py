@@ -6,9 +6,9 @@ import tempfile
 from pathlib import Path
 
 import colift
-from colift.viewer.browser import browser
-from colift.viewer.data import payload
-from colift.viewer.page import DRAWN, write_page
+from colift.show.viewer.browser import browser
+from colift.show.viewer.data import payload
+from colift.show.viewer.page import DRAWN, write_page
 
 HERE = Path(__file__).parent
 

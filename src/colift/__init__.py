@@ -6,35 +6,35 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from colift.allocation import Status
-    from colift.allocation.base import Allocation, Allocator
-    from colift.allocation.safe import SafeAllocator
-    from colift.allocation.sqp import SqpAllocator
-    from colift.compilation import Warmed, warm
+    from colift.control.allocation.base import Allocation, Allocator
+    from colift.control.allocation.safe import SafeAllocator
+    from colift.control.allocation.sqp import SqpAllocator
     from colift.errors import ColiftError, MissionError, SettingError
+    from colift.flight.compilation import Warmed, warm
+    from colift.flight.runner import Run, run
+    from colift.kernel.status import Status
     from colift.mission import Mission, load_mission
-    from colift.recording import Recording
-    from colift.runner import Run, run
+    from colift.record.recording import Recording
     from colift.team import Team
 
 # Resolved on first use: importing a kernel's module loads (the first time: compiles) it.
 _HOMES = {
-    "Allocation": "colift.allocation.base",
-    "Allocator": "colift.allocation.base",
+    "Allocation": "colift.control.allocation.base",
+    "Allocator": "colift.control.allocation.base",
     "ColiftError": "colift.errors",
     "Mission": "colift.mission",
     "MissionError": "colift.errors",
-    "Recording": "colift.recording",
-    "Run": "colift.runner",
-    "SafeAllocator": "colift.allocation.safe",
+    "Recording": "colift.record.recording",
+    "Run": "colift.flight.runner",
+    "SafeAllocator": "colift.control.allocation.safe",
     "SettingError": "colift.errors",
-    "SqpAllocator": "colift.allocation.sqp",
-    "Status": "colift.allocation",
+    "SqpAllocator": "colift.control.allocation.sqp",
+    "Status": "colift.kernel.status",
     "Team": "colift.team",
-    "Warmed": "colift.compilation",
+    "Warmed": "colift.flight.compilation",
     "load_mission": "colift.mission",
-    "run": "colift.runner",
-    "warm": "colift.compilation",
+    "run": "colift.flight.runner",
+    "warm": "colift.flight.compilation",
 }
 
 __all__ = [

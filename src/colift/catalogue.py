@@ -13,26 +13,34 @@ from typing import Any
 
 from colift.errors import MissionError, Problem, UnknownNameError
 
-LAYERS = (
-    "reference",
-    "sensing",
-    "estimation",
-    "load_control",
-    "allocation",
-    "link",
-    "position_control",
-    "attitude_control",
-    "actuation",
-    "detection",
-    "plant",
-)
-"""The layers of the block diagram: folder name, mission section and entry-point group suffix."""
+WINGS = {
+    "reference": "control",
+    "sensing": "world",
+    "estimation": "control",
+    "load_control": "control",
+    "allocation": "control",
+    "link": "world",
+    "position_control": "control",
+    "attitude_control": "control",
+    "actuation": "world",
+    "detection": "control",
+    "plant": "world",
+    "disturbance": "world",
+    "fault": "world",
+}
+"""Every folder of parts, in the order of the block diagram, and the wing that it stands in.
+
+A name here is the folder's, a mission section's and the suffix of a group of entry points.
+"""
 
 LISTS = ("disturbance", "fault")
 """Folders of which a mission may use several parts at once; its sections of this name are lists."""
 
-FOLDERS = (*LAYERS, *LISTS)
+FOLDERS = tuple(WINGS)
 """Every folder of parts."""
+
+LAYERS = tuple(folder for folder in FOLDERS if folder not in LISTS)
+"""The layers of the block diagram, of each of which a mission has one part."""
 
 DEFAULT_KINDS = {
     "sensing": "ideal",
@@ -55,8 +63,8 @@ def own_names(layer: str) -> list[str]:
         raise UnknownNameError("layer", layer, FOLDERS)
     return sorted(
         module.name.replace("_", "-")
-        for module in pkgutil.iter_modules([str(Path(__file__).parent / layer)])
-        if not module.name.startswith("_") and module.name != "base"
+        for module in pkgutil.iter_modules([str(Path(__file__).parent / WINGS[layer] / layer)])
+        if not (module.ispkg or module.name.startswith("_") or module.name == "base")
     )
 
 
@@ -82,7 +90,7 @@ def _plugged() -> dict[str, dict[str, importlib.metadata.EntryPoint]]:
 
 def mission_names() -> list[str]:
     """Names of the shipped missions."""
-    folder = importlib.resources.files("colift.missions")
+    folder = importlib.resources.files("colift.mission.shipped")
     return sorted(
         f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")
     )
@@ -112,7 +120,9 @@ def read_source(source: str | Path) -> tuple[str, dict[str, Any]]:
         if str(source) not in mission_names():
             raise UnknownNameError("mission", str(source), mission_names())
         label = f"{source}.toml (shipped)"
-        text = (importlib.resources.files("colift.missions") / f"{source}.toml").read_text("utf-8")
+        text = (importlib.resources.files("colift.mission.shipped") / f"{source}.toml").read_text(
+            "utf-8"
+        )
     try:
         return label, tomllib.loads(text)
     except (ValueError, RecursionError) as error:

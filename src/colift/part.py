@@ -12,12 +12,11 @@ import importlib.util
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast, dataclass_transform
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic._internal._model_construction import ModelMetaclass
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from colift import catalogue
 from colift.catalogue import FOLDERS as FOLDERS
@@ -27,10 +26,7 @@ from colift.errors import ColiftError, SettingError, UnknownNameError
 from colift.extras import install
 from colift.kernel.layout import Layout
 from colift.team import Team
-from colift.wording import problems_of
-
-if TYPE_CHECKING:
-    from colift.mission.mission import Mission
+from colift.wording import Refusing, problems_of
 
 Vector = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -39,22 +35,64 @@ KIND = ("kind",)
 """Key beside a part's settings in a mission's section."""
 
 
-@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
-class Refusing(ModelMetaclass):
-    """Calling such a class with settings that it refuses raises an error of ours."""
+class Setup(Protocol):
+    """What a part may look at of the mission that it flies in, to warn before the flight."""
 
-    def __call__(cls, *args: Any, **settings: Any) -> Any:  # noqa: N805
-        try:
-            return super().__call__(*args, **settings)
-        except ValidationError as error:
-            raise SettingError(problems_of(error, cast(type[BaseModel], cls), settings)) from error
+    @property
+    def kinds(self) -> Mapping[str, str]:
+        """Name of the part in each layer."""
+        ...
+
+    @property
+    def team(self) -> Team:
+        """What the controllers are told of drones, cables and load."""
+        ...
+
+    @property
+    def true_team(self) -> Team:
+        """The bodies as they are."""
+        ...
+
+    @property
+    def timing(self) -> Any:
+        """Duration, physics step and periods, s."""
+        ...
+
+    @property
+    def events(self) -> Sequence[Any]:
+        """Changes during the flight."""
+        ...
+
+    @property
+    def sensing(self) -> Any:
+        """The part of this layer, as of the next ones."""
+        ...
+
+    @property
+    def allocation(self) -> Any: ...
+
+    @property
+    def actuation(self) -> Any: ...
+
+    @property
+    def disturbance(self) -> Sequence[Any]:
+        """Disturbances, all at once."""
+        ...
+
+    def first_drones(self) -> list[int]:
+        """Numbers of the drones that fly from the start."""
+        ...
+
+    def start_directions(self) -> Vector:
+        """Unit cable directions (k, 3) at t = 0 of the drones that fly from the start."""
+        ...
 
 
 class Part(BaseModel, metaclass=Refusing):
     """Settings of one implementation of one layer.
 
     A subclass declares its fields, names its ``kernel`` and packs the fields for it. Kernels may be
-    compiled (:func:`colift.jit.kernel`, with the layer's signature) or plain Python functions.
+    compiled (:func:`colift.kernel.jit.kernel`, with the layer's signature) or plain Python functions.
     """
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True, allow_inf_nan=False)
@@ -167,7 +205,7 @@ class Part(BaseModel, metaclass=Refusing):
         """Limits that this team cannot keep in flight, as for :meth:`check`; such a mission is refused too."""
         return []
 
-    def warnings(self, mission: Mission) -> Iterable[tuple[str, str]]:
+    def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         """What is likely to go wrong with this part in a valid mission, as ``(field, message)``.
 
         The field is one of the part's own (or ``kind``); the message names the other one. Nothing is
@@ -247,12 +285,17 @@ def names(layer: str) -> list[str]:
     return sorted({*catalogue.names(layer), *registered})
 
 
+def home(layer: str) -> str:
+    """The package that holds colift's own parts of a layer."""
+    return f"colift.{catalogue.WINGS[layer]}.{layer}"
+
+
 def find(layer: str, kind: str) -> type[Part]:
     """The class behind ``kind`` in ``layer``: registered, our own file's, or another package's."""
     if (layer, kind) in _registered:
         return _registered[layer, kind]
     if kind in catalogue.own_names(layer):
-        module = importlib.import_module(f"colift.{layer}.{kind.replace('-', '_')}")
+        module = importlib.import_module(f"{home(layer)}.{kind.replace('-', '_')}")
         return _parts_of(module, module.__name__)[0]
     point = catalogue.plugged(layer).get(kind)
     if point is None:
@@ -287,7 +330,7 @@ def kind_of(part: type[Part]) -> str:
     for (layer, kind), registered in _registered.items():
         if layer == part.layer and registered is part:
             return kind
-    if part.__module__.startswith(f"colift.{part.layer}."):
+    if part.__module__.startswith(f"{home(part.layer)}."):
         return part.__module__.rpartition(".")[2].replace("_", "-")
     points = catalogue.plugged(part.layer).values()
     return next(point.name for point in points if point.load() is part)

@@ -11,11 +11,12 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
+from pydantic._internal._model_construction import ModelMetaclass
 from pydantic_core import ErrorDetails
 
 from colift.errors import Problem, SettingError
@@ -185,3 +186,14 @@ def _valid_keys(
         arguments = getattr(annotation, "__args__", ())
         current = next((a for a in arguments if hasattr(a, "model_fields")), annotation)
     return [*getattr(current, "model_fields", {}), *(further if not location else ())]
+
+
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
+class Refusing(ModelMetaclass):
+    """Calling such a class with settings that it refuses raises an error of ours."""
+
+    def __call__(cls, *args: Any, **settings: Any) -> Any:  # noqa: N805
+        try:
+            return super().__call__(*args, **settings)
+        except ValidationError as error:
+            raise SettingError(problems_of(error, cast(type[BaseModel], cls), settings)) from error

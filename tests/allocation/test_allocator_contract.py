@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
 
 from colift import part
-from colift.allocation.base import INFO_BALANCE, INFO_SIZE, Status, ask
-from colift.geometry import ring
-from colift.jit import JIT_ENABLED, address_of
+from colift.control.allocation.base import INFO_BALANCE, INFO_SIZE, Status, ask
+from colift.kernel.jit import JIT_ENABLED, address_of
 from colift.team import Team
+from colift.team.geometry import ring
 
 KINDS = part.names("allocation")
 SIZES = (1, 2, 3, 4, 7, 16)

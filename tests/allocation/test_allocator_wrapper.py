@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colift.allocation.base import Allocator, Status
-from colift.allocation.ring import Ring
-from colift.allocation.sqp import Sqp, SqpAllocator
+from colift.control.allocation.base import Allocator, Status
+from colift.control.allocation.ring import Ring
+from colift.control.allocation.sqp import Sqp, SqpAllocator
 from colift.errors import SettingError
-from colift.geometry import ring
 from colift.team import Team
+from colift.team.geometry import ring
 
 HOVER = [0.0, 0.0, 2.2]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colift.allocation._fixed import FixedPattern
-from colift.allocation._sqp_newton import rotate
-from colift.allocation.base import Allocator, Status
-from colift.allocation.lopsided import Lopsided
-from colift.allocation.ring import Ring
-from colift.geometry import pairwise_angles
+from colift.control.allocation.base import Allocator, Status
+from colift.control.allocation.common.fixed import FixedPattern
+from colift.control.allocation.lopsided import Lopsided
+from colift.control.allocation.paper.newton import rotate
+from colift.control.allocation.ring import Ring
+from colift.team.geometry import pairwise_angles
 
 HOVER = np.array([0.0, 0.0, 0.225 * 9.81])
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import colift
-from colift.allocation.base import Allocator
+from colift.control.allocation.base import Allocator
 from colift.errors import SettingError
-from colift.geometry import pairwise_angles, ring, widest_gap
+from colift.flight.flight import Flight, start_state
 from colift.part import find
-from colift.simulation.flight import Flight, start_state
 from colift.team import Team
+from colift.team.geometry import pairwise_angles, ring, widest_gap
 
 FORCE = np.array([0.2, 0.1, 2.2])
 KINDS = ("safe", "sqp", "min-norm", "internal-force", "ring")

@@ -12,16 +12,21 @@ import pytest
 
 import colift
 from colift import part
-from colift.allocation._oracle import Limits, TensionProblem, beyond_saddles, outcome_of
-from colift.allocation.base import Allocator, Status
-from colift.allocation.internal_force import InternalForce
-from colift.allocation.min_norm import MinNorm
-from colift.allocation.sqp import SqpAllocator
-from colift.allocation.wahba_hoenig import half_spaces, least_forces, separating_normal
+from colift.control.allocation.base import Allocator, Status
+from colift.control.allocation.common.oracle import (
+    Limits,
+    TensionProblem,
+    beyond_saddles,
+    outcome_of,
+)
+from colift.control.allocation.internal_force import InternalForce
+from colift.control.allocation.min_norm import MinNorm
+from colift.control.allocation.sqp import SqpAllocator
+from colift.control.allocation.wahba_hoenig import half_spaces, least_forces, separating_normal
 from colift.errors import MissingExtraError, MissionError
-from colift.geometry import pairwise_angles, ring, rotation_between
 from colift.mission import load_mission
 from colift.team import Team
+from colift.team.geometry import pairwise_angles, ring, rotation_between
 
 UP = np.array([0.0, 0.0, 1.0])
 HOVER = 0.225 * 9.81 * UP

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colift.allocation import _sqp_newton as newton
-from colift.allocation.sqp import Sqp, SqpAllocator
-from colift.geometry import pairwise_angles, ring
+from colift.control.allocation.paper import newton
+from colift.control.allocation.sqp import Sqp, SqpAllocator
+from colift.team.geometry import pairwise_angles, ring
 
 
 def objective_of_alignment(a, n, mu, W):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from colift.allocation import _sqp_newton as newton
-from colift.allocation.sqp import SqpAllocator
-from colift.geometry import ring
+from colift.control.allocation.paper import newton
+from colift.control.allocation.sqp import SqpAllocator
+from colift.team.geometry import ring
 
 
 def lagrangian(n, mu, force, T, alpha, lam):

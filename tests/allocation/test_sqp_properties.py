@@ -7,9 +7,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from colift.allocation.base import Status
-from colift.allocation.sqp import SqpAllocator
-from colift.geometry import ring
+from colift.control.allocation.base import Status
+from colift.control.allocation.sqp import SqpAllocator
+from colift.team.geometry import ring
 
 sizes = st.integers(1, 9)
 seeds = st.integers(0, 2**32 - 1)

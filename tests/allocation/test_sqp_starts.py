@@ -9,9 +9,9 @@ import sys
 import numpy as np
 import pytest
 
-from colift.allocation.base import Status
-from colift.allocation.sqp import SqpAllocator
-from colift.geometry import pairwise_angles, ring
+from colift.control.allocation.base import Status
+from colift.control.allocation.sqp import SqpAllocator
+from colift.team.geometry import pairwise_angles, ring
 
 W = 2.2
 HOVER = np.array([0.0, 0.0, W])
@@ -197,10 +197,10 @@ def test_a_closed_loop_of_forces_turns_the_formation_by_its_solid_angle():
 
 PROGRAM = """
 import numpy as np
-from colift.allocation.base import Allocator
-from colift.allocation.lopsided import Lopsided
-from colift.allocation.ring import Ring
-from colift.allocation.sqp import SqpAllocator
+from colift.control.allocation.base import Allocator
+from colift.control.allocation.lopsided import Lopsided
+from colift.control.allocation.ring import Ring
+from colift.control.allocation.sqp import SqpAllocator
 
 for allocator in (SqpAllocator(4), SqpAllocator(3, 1.35), Allocator(Ring(), 5), Allocator(Lopsided(), 4)):
     for force in ([0, 0, 2.2], [0.5, -0.3, 2.4], [0, 0, -2.2], [np.nan, 0, 0], [0, 0, 0], [1, 1, 1]):

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colift.actuation.motors import Motors
-from colift.allocation._feasibility import (
+from colift.control.allocation.limits.feasibility import (
     POLISHED,
     QUICK,
     feasibility,
@@ -21,10 +20,11 @@ from colift.allocation._feasibility import (
     widest_angle,
     widest_formation,
 )
-from colift.allocation._heaviest import Limits, best_tensions, extreme
-from colift.allocation.safe import Safe, SafeAllocator
-from colift.geometry import pairwise_angles, ring
+from colift.control.allocation.limits.heaviest import Limits, best_tensions, extreme
+from colift.control.allocation.safe import Safe, SafeAllocator
 from colift.team import Team
+from colift.team.geometry import pairwise_angles, ring
+from colift.world.actuation.motors import Motors
 
 WIDEST = {  # degrees, best found, for cones of 45, 60 and 75 degrees
     2: (90.0, 120.0, 150.0),

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colift import safety
-from colift.allocation._feasibility import spread_formation
-from colift.allocation._reach import out_of_reach
+from colift.control.allocation.limits.feasibility import spread_formation
+from colift.control.allocation.limits.reach import out_of_reach
+from colift.study import safety
 
 TURN, CONE = 0.06, np.radians(75.0)
 DOWN = np.array([0.0, 0.0, -1.0])

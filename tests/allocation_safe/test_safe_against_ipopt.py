@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colift.allocation._feasibility import spread_formation
-from colift.allocation._oracle import Limits, TensionProblem
-from colift.allocation.ipopt import minimise
-from colift.allocation.safe import SafeAllocator
-from colift.geometry import pairwise_angles
+from colift.control.allocation.common.oracle import Limits, TensionProblem
+from colift.control.allocation.ipopt import minimise
+from colift.control.allocation.limits.feasibility import spread_formation
+from colift.control.allocation.safe import SafeAllocator
 from colift.team import Team
+from colift.team.geometry import pairwise_angles
 
 pytest.importorskip("casadi", reason="optional: the extra ipopt (casadi)")
 

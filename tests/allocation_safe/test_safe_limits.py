@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from colift.allocation._feasibility import spread_formation
-from colift.allocation._reach import out_of_reach
-from colift.allocation.base import Status
-from colift.allocation.safe import SafeAllocator
-from colift.geometry import pairwise_angles, ring
+from colift.control.allocation.base import Status
+from colift.control.allocation.limits.feasibility import spread_formation
+from colift.control.allocation.limits.reach import out_of_reach
+from colift.control.allocation.safe import SafeAllocator
 from colift.team import Team
+from colift.team.geometry import pairwise_angles, ring
 
 G = 9.81
 ANGLE = {1: 30.0, 2: 30.0, 3: 30.0, 4: 30.0, 6: 30.0, 8: 30.0, 12: 25.0, 16: 25.0, 64: 11.0}

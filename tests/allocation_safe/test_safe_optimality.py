@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from colift.allocation._safe_cycle import JUMP, TURN
-from colift.allocation.safe import RATE_BARRIER, SafeAllocator
-from colift.geometry import rotation_between
+from colift.control.allocation.limits.cycle import JUMP, TURN
+from colift.control.allocation.safe import RATE_BARRIER, SafeAllocator
 from colift.team import Team
+from colift.team.geometry import rotation_between
 
 
 def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):

@@ -11,10 +11,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from colift import safety
-from colift.allocation.base import Status
-from colift.allocation.safe import SafeAllocator
-from colift.geometry import pairwise_angles
+from colift.control.allocation.base import Status
+from colift.control.allocation.safe import SafeAllocator
+from colift.study import safety
+from colift.team.geometry import pairwise_angles
 
 FIGURES = Path(__file__).parents[2] / "docs" / "figures"
 SETTLED = 100

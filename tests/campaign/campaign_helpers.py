@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from colift.campaign import engine
-from colift.campaign.plan import Case, Source, plan
+from colift.study.campaign import engine
+from colift.study.campaign.plan import Case, Source, plan
 
 SHORT = {"timing.duration": 0.2, "timing.allocation": 0.01, "reference.kind": "hover"}
 HEAD = """
 import os, time
 from pathlib import Path
-from colift.allocation.base import AllocatorPart
+from colift.control.allocation.base import AllocatorPart
 
 class Mine(AllocatorPart):
     layer = "allocation"

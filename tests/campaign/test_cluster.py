@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 from campaign_helpers import fly, hover
 
-from colift.campaign import workers
-from colift.campaign.engine import Options, Progress
-from colift.campaign.plan import Source, plan
-from colift.campaign.store import Store
 from colift.errors import ColiftError, MissingExtraError
+from colift.study.campaign import workers
+from colift.study.campaign.engine import Options, Progress
+from colift.study.campaign.plan import Source, plan
+from colift.study.campaign.store import Store
 
 distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 

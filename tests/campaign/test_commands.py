@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from colift.campaign.store import Store
+from colift.study.campaign.store import Store
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "my_allocator.py"
 SHORT = ("--set", "timing.duration=0.3", "--set", "criteria.max_tilt_deg.max=180")

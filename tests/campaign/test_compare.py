@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from colift.campaign import compare
 from colift.errors import ColiftError
 from colift.mission.load import load_mission
+from colift.study import compare
 
 
 def contest(*arguments, **options):

@@ -14,12 +14,12 @@ from typing import Any
 import pytest
 from campaign_helpers import fly, gone, hover, wait_for
 
-from colift.campaign.engine import Estimate, Options, Progress
-from colift.campaign.plan import Source, plan
-from colift.campaign.store import Store
 from colift.errors import ColiftError, MissionError
-from colift.metrics import all_metrics
-from colift.recording import Recording
+from colift.mission.criteria import METRICS
+from colift.record.recording import Recording
+from colift.study.campaign.engine import Estimate, Options, Progress
+from colift.study.campaign.plan import Source, plan
+from colift.study.campaign.store import Store
 
 Write = Callable[[str], Path]
 
@@ -33,7 +33,7 @@ def test_a_campaign_is_flown_once_and_every_number_is_kept(tmp_path: Path) -> No
     for row, case in zip(first.rows, cases, strict=True):
         assert {name: row[name] for name in case.labels} == case.labels
         assert (row["status"], row["outcome"], row["error"]) == ("flown", "completed", "")
-        assert {metric.name for metric in all_metrics()} <= row.keys()
+        assert {metric.name for metric in METRICS} <= row.keys()
         recording = Recording.load(row["recording"])
         assert recording.mission.seed == row["seed"]
         assert recording.mission.kinds["allocation"] == row["allocator"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from colift.campaign import judge
+from colift.study.campaign import judge
 
 
 def row(allocator: str, **values: Any) -> dict[str, Any]:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from colift.campaign import plan as module
-from colift.campaign.plan import HEADING, OFFSET, Case, Source, plan, problems, sift, varied
 from colift.errors import ColiftError, MissionError
 from colift.mission.load import load_mission
+from colift.study.campaign import plan as module
+from colift.study.campaign.plan import HEADING, OFFSET, Case, Source, plan, problems, sift, varied
 
 
 def key(overrides: dict[str, object], sources: tuple[Source, ...] = ()) -> str:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colift.math.shares import interval, percent, text
+from colift.kernel.math.shares import interval, percent, text
 
 
 def at_least(hits: int, trials: int, share: float) -> float:

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 from campaign_helpers import hover
 
-from colift.campaign.plan import Job, plan
-from colift.campaign.store import Store, write_csv, write_parquet
-from colift.campaign.workers import Result
 from colift.errors import ColiftError, MissingExtraError
+from colift.study.campaign.plan import Job, plan
+from colift.study.campaign.store import Store, write_csv, write_parquet
+from colift.study.campaign.workers import Result
 
 
 def filled(path: Path) -> list[Job]:

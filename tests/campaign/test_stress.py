@@ -14,12 +14,13 @@ from pathlib import Path
 import pytest
 
 import colift
-from colift.campaign import engine, stress
-from colift.campaign.plan import plan
-from colift.campaign.store import Store
 from colift.errors import ColiftError, MissionError, UnknownNameError
 from colift.mission import load_mission
-from colift.report.stress import COLUMNS, SHARES, matrix_tables, write_stress
+from colift.show.report.stress import COLUMNS, SHARES, matrix_tables, write_stress
+from colift.study import stress
+from colift.study.campaign import engine
+from colift.study.campaign.plan import plan
+from colift.study.campaign.store import Store
 
 SHORT = {"timing.duration": 7.0}
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from colift.campaign.plan import HEADING, OFFSET
-from colift.campaign.sweep import METRICS, Over, cases, parse_over, points
 from colift.errors import ColiftError, MissionError
-from colift.report.campaign import not_held, sweep_tables
-from colift.report.campaign_figures import Swept
+from colift.show.report.campaign import not_held, sweep_tables
+from colift.show.report.campaign_figures import Swept
+from colift.study.campaign.plan import HEADING, OFFSET
+from colift.study.sweep import COLUMNS, Over, cases, parse_over, points
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_is_swept_wins_over_what_is_set() -> None:
 
 def test_points_gather_seeds_and_tell_held_missed_and_lost_apart() -> None:
     def row(mass: float, angle: float, level: str = "pass", why: str = "") -> dict[str, Any]:
-        numbers = dict.fromkeys(METRICS, 1.0) | {"min_angle_deg": angle}
+        numbers = dict.fromkeys(COLUMNS, 1.0) | {"min_angle_deg": angle}
         return {"load.mass": mass, "status": "flown", "level": level, "reasons": why, **numbers}
 
     def error(mass: float, status: str) -> dict[str, Any]:
@@ -119,7 +119,7 @@ def test_points_gather_seeds_and_tell_held_missed_and_lost_apart() -> None:
     header, lines = tables[0][1:]
     assert header[:2] == ["mass", "held (95 %)"]
     assert [line[1] for line in lines] == ["2/5 (5-86 %)", "1/2 (1-99 %)", "refused"]
-    assert lines[2][2:] == ["-"] * len(METRICS)
+    assert lines[2][2:] == ["-"] * len(COLUMNS)
     assert not_held(Swept(rows, overs)) == [
         "load.mass 1.0: 2 held, 1 missed, 2 lost: too far (and 1 more)",
         "load.mass 2.0: 1 held, 1 failed: failed!",

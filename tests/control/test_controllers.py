@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import colift
-from colift.attitude_control.manifold import Manifold
-from colift.geometry import ring, zero_yaw_quaternion
-from colift.load_control.pid import Pid as LoadPid
-from colift.math import quaternion
-from colift.position_control.pid import Pid as PositionPid
+from colift.control.attitude_control.manifold import Manifold
+from colift.control.load_control.pid import Pid as LoadPid
+from colift.control.position_control.pid import Pid as PositionPid
+from colift.kernel.math import quaternion
 from colift.team import Team
+from colift.team.geometry import ring, zero_yaw_quaternion
 
 E3 = np.array([0.0, 0.0, 1.0])
 G = 9.81

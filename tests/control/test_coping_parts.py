@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import colift
-from colift.attitude_control.delay_aware import DelayAware
-from colift.estimation.predictor import Predictor, steady_gains
-from colift.load_control.adaptive import Adaptive
+from colift.control.attitude_control.delay_aware import DelayAware
+from colift.control.estimation.predictor import Predictor, steady_gains
+from colift.control.load_control.adaptive import Adaptive
+from colift.control.position_control import disturbance_observer as observer
+from colift.control.position_control.disturbance_observer import DisturbanceObserver
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.position_control import disturbance_observer as observer
-from colift.position_control.disturbance_observer import DisturbanceObserver
-from colift.simulation.flight import Flight
 from colift.team import Team
 
 PERIOD = 0.01

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import colift
-from colift.jit import inline
-from colift.math.sphere import follow
+from colift.kernel.jit import inline
+from colift.kernel.math.sphere import follow
 
 
 @inline

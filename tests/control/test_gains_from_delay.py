@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colift.attitude_control.delay_aware import DelayAware
+from colift.control.attitude_control.delay_aware import DelayAware
+from colift.control.tuning import DOUBT, RATE_MARGIN, VELOCITY_MARGIN, Delays
 from colift.team import Team
-from colift.tuning import DOUBT, RATE_MARGIN, VELOCITY_MARGIN, Delays
 
 settings_of_a_loop = st.fixed_dictionaries(
     {

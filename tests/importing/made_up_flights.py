@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colift.importing.base import Array
+from colift.record.importing.base import Array
 
 SPREAD = np.radians(25.0)
 """Half-angle between each cable of the made-up flight and the vertical."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from colift.errors import FlightDataError
-from colift.importing import Reading, import_flight
+from colift.record.importing import Reading, import_flight
 
 SIGNALS = (
     "load",

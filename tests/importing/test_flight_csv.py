@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_flights import LENGTH, SPREAD, WEIGHT, cables, flight_columns, write_csv
 
-from colift import metrics
 from colift.errors import FlightDataError
-from colift.importing import Assumed, import_flight, read
-from colift.recording import Recording
+from colift.record import metrics
+from colift.record.importing import Assumed, import_flight, read
+from colift.record.recording import Recording
 
 UNEVEN = np.cumsum(np.tile([0.01, 0.01, 0.05, 0.01], 60)) - 0.01
 """Times with gaps, as real logs have them, s."""

@@ -16,13 +16,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_flights import cables, flight_columns, load_path, usd_log, write_csv
 
-from colift import metrics
 from colift.errors import FlightDataError
-from colift.importing import import_flight
-from colift.importing._clocks import merge
-from colift.importing.base import DRONE_COLUMNS, Log
-from colift.recording import Recording
-from colift.report import figures, html
+from colift.record import metrics
+from colift.record.importing import import_flight
+from colift.record.importing._clocks import merge
+from colift.record.importing.base import DRONE_COLUMNS, Log
+from colift.record.recording import Recording
+from colift.show.report import figures, html
 
 TIME = np.arange(600) * 0.01
 

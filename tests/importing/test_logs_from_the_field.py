@@ -17,14 +17,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_flights import LENGTH, flight_columns, usd_bytes, usd_log, write_csv
 
-from colift import metrics
 from colift.errors import FlightDataError
-from colift.importing import Reading, import_flight
-from colift.judgement import judge
-from colift.recording import Recording
-from colift.report.html import write_report
-from colift.verdict import judge as verdict_of
-from colift.viewer.data import payload
+from colift.record import metrics
+from colift.record.importing import Reading, import_flight
+from colift.record.recording import Recording
+from colift.record.verdict import judge as verdict_of
+from colift.show.report.html import write_report
+from colift.show.viewer.data import payload
+from colift.study.judge import judge
 
 TIME = np.arange(400) * 0.01
 Columns = dict[str, np.ndarray]

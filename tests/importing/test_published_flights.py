@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colift import metrics
-from colift.importing import import_flight
-from colift.judgement import ACTUAL, ON_BOARD, judge
+from colift.record import metrics
+from colift.record.importing import import_flight
+from colift.study.judge import ACTUAL, ON_BOARD, judge
 
 QUICK = ("safe", "sqp", "ring", "min-norm", "internal-force")
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from made_up_flights import flight_columns, usd_bytes, usd_log
 
 from colift.errors import FlightDataError
-from colift.importing import read
-from colift.importing.usd_log import decode
+from colift.record.importing import read
+from colift.record.importing.usd_log import decode
 
 TIME = np.arange(300) * 0.01
 RANGES = {"b": (-128, 127), "B": (0, 255), "h": (-(2**15), 2**15 - 1), "H": (0, 2**16 - 1),

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from colift.live.session import Session
 from colift.mission import load_mission
-from colift.recording import Recording
+from colift.record.recording import Recording
+from colift.show.live.session import Session
 
 
 class Hand:

@@ -11,9 +11,9 @@ import pytest
 aiohttp = pytest.importorskip("aiohttp", reason="the extra 'live' is not installed")
 
 from colift.errors import ColiftError  # noqa: E402
-from colift.live import server as module  # noqa: E402
-from colift.live.server import Server  # noqa: E402
-from colift.recording import Recording  # noqa: E402
+from colift.record.recording import Recording  # noqa: E402
+from colift.show.live import server as module  # noqa: E402
+from colift.show.live.server import Server  # noqa: E402
 
 PATIENCE = 60.0
 

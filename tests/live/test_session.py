@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from colift.errors import ColiftError
-from colift.geometry import pairwise_angles
-from colift.live import session as module
-from colift.live.pilot import Pilot
+from colift.flight.flight import Flight
 from colift.mission.load import load_mission
-from colift.recording import Recording
-from colift.simulation.flight import Flight
+from colift.record.recording import Recording
+from colift.show.live import session as module
+from colift.show.live.pilot import Pilot
+from colift.team.geometry import pairwise_angles
 
 
 def last(hand):

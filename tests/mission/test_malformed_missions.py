@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import colift
-from colift.allocation._feasibility import widest_formation
+from colift.control.allocation.limits.feasibility import widest_formation
 from colift.errors import ColiftError, MissionError, UnknownNameError
-from colift.geometry import ring
 from colift.mission.load import load_mission, parse_override
+from colift.team.geometry import ring
 
 NAN, INF = float("nan"), float("inf")
 

@@ -10,10 +10,10 @@ import sys
 import numpy as np
 import pytest
 
-from colift.allocation._hover import RESERVE
+from colift.control.allocation.limits.hover import RESERVE
 from colift.errors import MissionError
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.simulation.flight import Flight
 
 WEAK = {
     "name": "weak-motors",

@@ -10,9 +10,9 @@ from itertools import permutations
 import pytest
 
 import colift
-from colift.campaign import compare, stress, sweep
 from colift.mission.load import layered, load_mission, parse_overrides
 from colift.part import LAYERS, LISTS, find, names
+from colift.study import compare, stress, sweep
 
 HOVER = load_mission("hover").resolved()
 REQUIRED = {("reference", "waypoints"): {"points": [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]]}}
@@ -174,7 +174,7 @@ def test_so_does_every_command(tmp_path):
         )
         assert json.loads(done.stdout), name
     assert 'kind = "motors"' in (tmp_path / "run" / "mission.toml").read_text()
-    from colift.campaign.store import Store
+    from colift.study.campaign.store import Store
 
     with Store(tmp_path / "stress" / "campaign.sqlite") as store:
         ((mission,),) = store._db.execute("SELECT mission FROM runs").fetchall()

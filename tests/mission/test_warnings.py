@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import colift
+from colift.control.tuning import loop_growth
+from colift.flight.flight import Flight
 from colift.mission import load_mission, mission_names
 from colift.mission.warnings import warnings_of
-from colift.simulation.flight import Flight
-from colift.tuning import loop_growth
 
 HOVER = {"name": "t", "reference": {"kind": "hover"}, "timing": {"duration": 2.0}}
 

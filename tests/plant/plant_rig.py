@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from colift.kernel.ports import PORTS
-from colift.plant._bodies import BODY, DRONE, LOAD, MASS, state_size
-from colift.plant._chain import BEAD, CABLE
-from colift.plant.base import Start
-from colift.plant.rigid_cables import RigidCables
 from colift.team import Team
+from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, state_size
+from colift.world.plant._chain import BEAD, CABLE
+from colift.world.plant.base import Start
+from colift.world.plant.rigid_cables import RigidCables
 
 E3 = np.array([0.0, 0.0, 1.0])
 DOWN = np.array([[0.0, 0.0, -1.0]])

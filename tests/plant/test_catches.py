@@ -9,10 +9,10 @@ import pytest
 from plant_rig import DOWN, Rig
 
 import colift
-from colift import metrics
+from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.part import find
-from colift.simulation.flight import Flight
+from colift.record import metrics
 from colift.team import Team
 
 CATCHING = ("slack-cables", "elastic-cables", "bead-cables", "mujoco")

@@ -11,10 +11,10 @@ from scipy.optimize import brentq
 
 import colift
 from colift.errors import MissionError
-from colift.plant.bead_cables import AIR, BeadCables
-from colift.plant.elastic_cables import ElasticCables
-from colift.plant.rigid_cables import RigidCables
 from colift.team import Team
+from colift.world.plant.bead_cables import AIR, BeadCables
+from colift.world.plant.elastic_cables import ElasticCables
+from colift.world.plant.rigid_cables import RigidCables
 
 WHIRL = np.array([[0.0, 1.5, 0.0]])
 

@@ -10,9 +10,9 @@ from plant_rig import DOWN, E3, Rig, random_rig, slack_rig
 
 import colift
 from colift import part
-from colift.geometry import ring, zero_yaw_quaternion
-from colift.plant.rigid_cables import RigidCables
 from colift.team import Team
+from colift.team.geometry import ring, zero_yaw_quaternion
+from colift.world.plant.rigid_cables import RigidCables
 
 KINDS = part.names("plant")
 SETTINGS = {"bead-cables": {"drag_coefficient": 0.0, "beads": 2}}

@@ -13,10 +13,10 @@ import pytest
 from plant_rig import DOWN, E3, Rig, random_rig, rotation
 
 import colift
-from colift.geometry import ring
-from colift.plant._bodies import DRONE, LOAD
-from colift.plant._rigid import derivative
 from colift.team import Team
+from colift.team.geometry import ring
+from colift.world.plant._bodies import DRONE, LOAD
+from colift.world.plant._rigid import derivative
 
 
 def oracle(team, directions, direction_rates, attitudes, thrusts, external):

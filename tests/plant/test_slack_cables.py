@@ -9,8 +9,8 @@ import pytest
 from plant_rig import DOWN, E3, Rig, random_rig, rotation, slack_rig
 
 import colift
-from colift.plant.slack_cables import SlackCables
 from colift.team import Team
+from colift.world.plant.slack_cables import SlackCables
 
 
 def stretch(rig):

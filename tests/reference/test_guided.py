@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colift.reference.guided import Guided
-from colift.reference.spiral import Spiral
+from colift.control.reference.guided import Guided
+from colift.control.reference.spiral import Spiral
 
 STILL = np.array([[1.0, -2.0, 1.5], *np.zeros((3, 3))])
 coordinates = st.floats(-20.0, 20.0)

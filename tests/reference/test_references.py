@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colift import part
-from colift.math.smooth import phase, rest_to_rest
-from colift.reference.waypoints import Waypoints
+from colift.control.reference.waypoints import Waypoints
+from colift.kernel.math.smooth import phase, rest_to_rest
 
 NAMES = part.names("reference")
 STEP = 1e-4

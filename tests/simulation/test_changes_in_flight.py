@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colift.disturbance.push import Push
+from colift.control.reference.guided import Guided
 from colift.errors import ColiftError, MissionError
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.reference.guided import Guided
-from colift.simulation.flight import Flight
+from colift.world.disturbance.push import Push
 
 TABLE = {
     "name": "test",

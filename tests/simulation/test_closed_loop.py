@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import colift
+from colift.flight import flight as flight_module
+from colift.flight.flight import Flight, start_state
 from colift.kernel.signals import SIGNALS, columns, make_bus
 from colift.mission import load_mission
-from colift.simulation import flight as flight_module
-from colift.simulation.flight import Flight, start_state
 
 G = 9.81
 

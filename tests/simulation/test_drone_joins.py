@@ -7,7 +7,7 @@ import pytest
 
 import colift
 from colift.errors import MissionError
-from colift.geometry import pairwise_angles, ring, widest_gap
+from colift.team.geometry import pairwise_angles, ring, widest_gap
 
 
 def event(at: float, change: str, drone: object) -> dict[str, object]:

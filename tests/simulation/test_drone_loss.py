@@ -56,7 +56,7 @@ def test_two_losses_one_after_the_other_name_drones_by_their_first_number():
 
 
 def test_metrics_and_report_take_the_gap(tmp_path):
-    from colift.report.html import write_report
+    from colift.show.report.html import write_report
 
     run = flown("paper-spiral", (3.0, 3), allocator="ring")
     unknown = {name for name, value in run.metrics.items() if not np.isfinite(value)}

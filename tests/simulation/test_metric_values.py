@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import colift
-from colift import metrics
-from colift.geometry import ring
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.mission import load_mission
-from colift.recording import Recording
+from colift.mission.criteria import METRICS
+from colift.record import metrics
+from colift.record.recording import Recording
+from colift.team.geometry import ring
 
 
 def synthetic(n=4, duration=20.0, period=0.01):
@@ -113,7 +114,7 @@ def test_metric_of_the_synthetic_flight(name):
 
 
 def test_every_metric_has_a_known_answer_a_unit_and_a_meaning():
-    found = {metric.name: metric for metric in metrics.all_metrics()}
+    found = {metric.name: metric for metric in METRICS}
     assert set(found) == set(EXPECTED)
     for name, metric in found.items():
         assert metric.meaning

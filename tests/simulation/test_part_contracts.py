@@ -11,18 +11,19 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
 import colift
-from colift import jit, part
-from colift.allocation import base as allocation
+from colift import part
+from colift.control.allocation import base as allocation
 from colift.errors import ColiftError, SettingError, UnknownNameError
-from colift.fault.base import LOAD
+from colift.flight.flight import Flight
+from colift.flight.loop import FUNCTIONS
+from colift.kernel import jit
 from colift.kernel.ports import PORTS
 from colift.kernel.signals import CONDITIONS
 from colift.mission import load_mission
-from colift.plant.base import Start
-from colift.simulation.flight import Flight
-from colift.simulation.loop import FUNCTIONS
 from colift.team import Team
 from colift.wording import meanings
+from colift.world.fault.base import LOAD
+from colift.world.plant.base import Start
 
 SIGNATURES = {
     layer: {
@@ -297,7 +298,7 @@ def test_a_users_file_registers_its_parts(tmp_path, monkeypatch):
     monkeypatch.setattr(part, "_registered", dict(part._registered))
     path = tmp_path / "my_hover.py"
     path.write_text(
-        "from colift.reference.base import ReferencePart\n"
+        "from colift.control.reference.base import ReferencePart\n"
         "def kernel(now, sees, params, memory, writes):\n"
         "    writes.reference[:] = 0.0\n"
         "    writes.reference[0, 2] = 2.0\n"

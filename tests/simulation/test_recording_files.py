@@ -11,7 +11,7 @@ import pytest
 import colift
 from colift.errors import RecordingError
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
-from colift.recording import Recording, atomic_path
+from colift.record.recording import Recording, atomic_path
 
 
 @pytest.fixture(scope="module")

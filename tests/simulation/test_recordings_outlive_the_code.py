@@ -20,15 +20,15 @@ import h5py
 import numpy as np
 import pytest
 
-from colift import metrics
 from colift.errors import AbsentSignalError, RecordingError
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
-from colift.moments import find_moments
-from colift.recording import Recording
-from colift.report.figures import drawable
-from colift.report.html import write_report
-from colift.verdict import judge
-from colift.viewer.data import payload
+from colift.record import metrics
+from colift.record.moments import find_moments
+from colift.record.recording import Recording
+from colift.record.verdict import judge
+from colift.show.report.figures import drawable
+from colift.show.report.html import write_report
+from colift.show.viewer.data import payload
 
 KEPT = Path(__file__).parents[1] / "data" / "format-1.h5"
 
@@ -106,7 +106,7 @@ TRACKING = 0.044928046784103226
 def test_opening_imports_no_kernel() -> None:
     """Nor anything else that takes long; what is judged of it, its numbers and moments, neither."""
     script = (
-        "import sys; from colift.recording import Recording; from colift import metrics, moments, verdict\n"
+        "import sys; from colift.record.recording import Recording; from colift import metrics, moments, verdict\n"
         f"flight = Recording.load({str(KEPT)!r}); numbers = metrics.compute(flight)\n"
         "verdict.judge(flight, numbers); moments.find_moments(flight)\n"
         "print(*{name.partition('.')[0] for name in sys.modules})\n"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.simulation.flight import Flight
 
 
 def same(a, b):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import colift
-from colift import metrics, verdict
 from colift.mission import load_mission
-from colift.verdict import criteria_of, judge, limits
+from colift.record import metrics, verdict
+from colift.record.verdict import criteria_of, judge, limits
 
 SHORT = {"timing.duration": 0.3}
 

@@ -10,10 +10,10 @@ import pytest
 from flown import PATIENCE, Open, Opened, Size, fly, payload_of
 
 from colift.errors import BrowserError
-from colift.recording import Recording
-from colift.viewer.browser import browser as start
-from colift.viewer.browser import find_browser
-from colift.viewer.page import DRAWN, write_page
+from colift.record.recording import Recording
+from colift.show.viewer.browser import browser as start
+from colift.show.viewer.browser import find_browser
+from colift.show.viewer.page import DRAWN, write_page
 
 
 @pytest.fixture(scope="session")

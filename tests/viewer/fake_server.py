@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from aiohttp import WSMsgType, web
 
-from colift.recording import Recording
-from colift.viewer.page import ASSETS, live_page
+from colift.record.recording import Recording
+from colift.show.viewer.page import ASSETS, live_page
 
 TOKEN = "right"
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import colift
-from colift import metrics
 from colift.mission.load import load_mission
-from colift.recording import Recording
-from colift.viewer.data import payload
+from colift.record import metrics
+from colift.record.recording import Recording
+from colift.show.viewer.data import payload
 
 Size = tuple[int, int]
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from colift.allocation import Status
+from colift.kernel.status import Status
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "viewer"
-ASSETS = ROOT / "src" / "colift" / "viewer" / "assets"
+ASSETS = ROOT / "src" / "colift" / "show" / "viewer" / "assets"
 
 built = pytest.mark.skipif(
     not (SOURCES / "node_modules").is_dir() or shutil.which("npm") is None,

@@ -13,12 +13,12 @@ from flown import PATIENCE, Open, Opened
 
 pytest.importorskip("aiohttp", reason="needs the extra live")
 
-from colift.geometry import pairwise_angles
-from colift.live.pilot import Pilot
-from colift.live.server import Server
-from colift.live.session import Session
 from colift.mission import load_mission
-from colift.recording import Recording
+from colift.record.recording import Recording
+from colift.show.live.pilot import Pilot
+from colift.show.live.server import Server
+from colift.show.live.session import Session
+from colift.team.geometry import pairwise_angles
 
 
 class Flying:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from flown import Open, Opened
 
-from colift.recording import Recording
+from colift.record.recording import Recording
 
 pytest.importorskip("aiohttp", reason="needs the extra live")
 

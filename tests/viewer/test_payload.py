@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from flown import fly, payload_of
 
-from colift import metrics
-from colift.allocation import Status
-from colift.moments import Moment, find_moments
-from colift.recording import Recording
-from colift.viewer.data import BUDGET, RATE, payload
-from colift.viewer.page import live_page, replay_page
+from colift.kernel.status import Status
+from colift.record import metrics
+from colift.record.moments import Moment, find_moments
+from colift.record.recording import Recording
+from colift.show.viewer.data import BUDGET, RATE, payload
+from colift.show.viewer.page import live_page, replay_page
 
 
 def unpack(packed: dict[str, Any], kind: str = "<f4") -> np.ndarray[Any, Any]:

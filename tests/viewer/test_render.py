@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from colift.cli import app
 from colift.errors import BrowserError
-from colift.recording import Recording
-from colift.viewer import browser as finding
-from colift.viewer import render
+from colift.record.recording import Recording
+from colift.show.viewer import browser as finding
+from colift.show.viewer import render
 
 run = CliRunner().invoke
 

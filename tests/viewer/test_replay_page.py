@@ -12,14 +12,14 @@ import pytest
 from flown import Open, Opened, fly, payload_of
 from PIL import Image
 
-from colift import metrics
-from colift.geometry import pairwise_angles
 from colift.mission.load import load_mission
-from colift.recording import Recording
-from colift.report import html
-from colift.verdict import judge
-from colift.viewer.data import payload
-from colift.viewer.page import write_page
+from colift.record import metrics
+from colift.record.recording import Recording
+from colift.record.verdict import judge
+from colift.show.report import html
+from colift.show.viewer.data import payload
+from colift.show.viewer.page import write_page
+from colift.team.geometry import pairwise_angles
 
 EVIL = "</script><img src=x onerror=\"document.title='owned'\"><b>bold</b>"
 

@@ -7,12 +7,12 @@ import pytest
 from air_rig import Air
 
 import colift
-from colift.disturbance.drag import Drag
-from colift.disturbance.dryden import Dryden
-from colift.disturbance.gust import Gust
-from colift.disturbance.wind import Wind
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.simulation.flight import Flight
+from colift.world.disturbance.drag import Drag
+from colift.world.disturbance.dryden import Dryden
+from colift.world.disturbance.gust import Gust
+from colift.world.disturbance.wind import Wind
 
 RHO = 1.225
 CALM = {"load_area": 0.0, "drone_area": 0.0, "cable_diameter": 0.0}

@@ -7,14 +7,14 @@ import pytest
 from air_rig import Air
 from numpy.testing import assert_array_equal
 
-from colift.actuation.motors import Motors
-from colift.disturbance.dryden import Dryden
-from colift.disturbance.gust import Gust
-from colift.link.radio import Radio
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.sensing.noisy import Noisy
-from colift.simulation.flight import Flight
 from colift.team import Team
+from colift.world.actuation.motors import Motors
+from colift.world.disturbance.dryden import Dryden
+from colift.world.disturbance.gust import Gust
+from colift.world.link.radio import Radio
+from colift.world.sensing.noisy import Noisy
 
 STEPS = (0.0005, 0.001, 0.002)
 TIMES = 0.01 * np.arange(101)

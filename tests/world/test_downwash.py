@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from air_rig import Air
 
-from colift.disturbance.downwash import Downwash, speed_at
+from colift.world.disturbance.downwash import Downwash, speed_at
 
 RHO, RADIUS, THRUST = 1.225, 0.1, 6.0
 DISC = 2.0 * RADIUS  # one disc as large as four rotors

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 import colift
-from colift.allocation import Status
-from colift.allocation.base import Allocator
-from colift.detection.residuals import MEMORY, Residuals
+from colift.control.allocation.base import Allocator
+from colift.control.detection.residuals import MEMORY, Residuals
+from colift.control.reference.descent import Descent
 from colift.errors import MissionError
-from colift.fault.base import LOAD
-from colift.fault.battery_low import BatteryLow
-from colift.fault.motor_degraded import MotorDegraded
+from colift.flight.flight import Flight
 from colift.kernel.signals import CYCLE_SIGNALS
-from colift.metrics import compute
+from colift.kernel.status import Status
 from colift.mission import load_mission
-from colift.reference.descent import Descent
-from colift.simulation.flight import Flight
+from colift.record.metrics import compute
+from colift.world.fault.base import LOAD
+from colift.world.fault.battery_low import BatteryLow
+from colift.world.fault.motor_degraded import MotorDegraded
 
 AT = 3.0
 REAL = ["ideal", "real"]

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colift import metrics
-from colift.actuation.ideal import Ideal
-from colift.actuation.motors import Motors, mix
 from colift.errors import MissionError
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.simulation.flight import Flight
+from colift.record import metrics
 from colift.team import Team
+from colift.world.actuation.ideal import Ideal
+from colift.world.actuation.motors import Motors, mix
 
 ARM, RATIO = 0.2, 0.016
 LEVER = ARM / np.sqrt(2.0)

@@ -8,8 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from colift.math import noise
-from colift.simulation.flight import random_key
+from colift.flight.flight import random_key
+from colift.kernel.math import noise
 
 KEY = random_key(0, "sensing")
 SAMPLES = 2**26

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from colift.errors import ColiftError, MissionError
-from colift.link.radio import Radio
+from colift.flight.flight import Flight
 from colift.mission import load_mission
-from colift.sensing.noisy import Noisy
-from colift.simulation.flight import Flight
 from colift.team import Team
+from colift.world.link.radio import Radio
+from colift.world.sensing.noisy import Noisy
 
 QUIET = {
     "load_position_noise": 0.0, "load_velocity_noise": 0.0, "position_noise": 0.0,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colift import survival
-from colift.geometry import pairwise_angles
 from colift.mission import load_mission
+from colift.study import survival
+from colift.team.geometry import pairwise_angles
 
 
 def test_every_fault_at_every_drone_at_every_time():

@@ -8,7 +8,7 @@ import { fileURLToPath } from "node:url";
 const root = join(dirname(fileURLToPath(import.meta.url)), "..");
 const option = process.argv.indexOf("--out");
 const target =
-  option > 0 ? resolve(process.argv[option + 1]) : join(root, "../src/colift/viewer/assets");
+  option > 0 ? resolve(process.argv[option + 1]) : join(root, "../src/colift/show/viewer/assets");
 
 const { metafile } = await build({
   absWorkingDir: root,

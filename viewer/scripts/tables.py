@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from colift.allocation import Status
-from colift.moments import FOLLOWING, KINDS, MOST_PAIRED, status_word
-from colift.report.marks import MARKS
-from colift.verdict import LEVELS
+from colift.kernel.status import Status
+from colift.record.moments import FOLLOWING, KINDS, MOST_PAIRED, status_word
+from colift.record.verdict import LEVELS
+from colift.show.report.marks import MARKS
 
 TARGET = Path(__file__).parents[1] / "src" / "tables.ts"
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.status import Status
 
-    from colift.simulation.flight import Progress as Report
-    from colift.verdict import Verdict
+    from colift.flight.flight import Progress as Report
+    from colift.record.verdict import Verdict
 
 EXIT_ERROR = 1
 EXIT_USAGE = 2
@@ -77,7 +77,7 @@ With = Annotated[
 def save_json(file: Path | None, result: Any) -> None:
     """Write a result where the user asked for it, whole or not at all."""
     if file is not None:
-        from colift.recording import atomic_path
+        from colift.record.recording import atomic_path
 
         with atomic_path(file) as temporary:
             temporary.write_text(json.dumps(plain(result), indent=2) + "\n")
@@ -120,7 +120,7 @@ def write_results(
     """
     import tomli_w
 
-    from colift.recording import atomic_path
+    from colift.record.recording import atomic_path
 
     files = {} if files is None else files
     files["recording"] = flown.recording.save(folder / RUN_FILES[0])
@@ -134,9 +134,9 @@ def write_results(
             temporary.write_text(text, encoding="utf-8")
         files[name] = folder / file
     if report:
-        from colift.report.html import write_report
-        from colift.viewer.data import payload
-        from colift.viewer.page import write_page
+        from colift.show.report.html import write_report
+        from colift.show.viewer.data import payload
+        from colift.show.viewer.page import write_page
 
         label = flown.mission.kinds["allocation"]
         data = payload([flown.recording], [flown.metrics], [label])
@@ -229,7 +229,7 @@ def emit(value: Any) -> None:
 @contextmanager
 def loading() -> Iterator[None]:
     """Say so when parts have to be compiled, and which, on a terminal."""
-    from colift.jit import told_of_compilation
+    from colift.kernel.jit import told_of_compilation
 
     with ExitStack() as stack:
         status: list[Status] = []

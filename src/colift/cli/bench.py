@@ -44,8 +44,8 @@ def bench(
     counts = None if sizes is None else numbers(sizes, 2, 1024)
     one_blas_thread()
     with loading():
-        from colift import benchmark
-        from colift.benchmark.tables import notes, tables
+        from colift.study import bench as benchmark
+        from colift.study.bench.tables import notes, tables
     counts = counts or list(benchmark.QUICK_SIZES if quick else benchmark.SIZES)
     with progress("Timing") as advance:
         result = benchmark.run(

@@ -25,8 +25,8 @@ from colift.cli.base import (
 )
 
 if TYPE_CHECKING:
-    from colift.campaign.engine import Outcome, Progress
-    from colift.campaign.plan import Case, Plan, Refused
+    from colift.study.campaign.engine import Outcome, Progress
+    from colift.study.campaign.plan import Case, Plan, Refused
 
 FILE = "campaign.sqlite"
 """Name of the file of results in a command's folder."""
@@ -102,7 +102,7 @@ def fly(
     recordings: bool = False,
 ) -> Outcome:
     """Fly what the folder does not hold yet, with a bar of flights; on Ctrl-C say how to go on."""
-    from colift.campaign import engine
+    from colift.study.campaign import engine
 
     check_out(folder, (FILE,))
     try:
@@ -134,7 +134,7 @@ def duration(seconds: float) -> str:
 
 def export(rows: Sequence[dict[str, Any]], csv: Path | None, parquet: Path | None) -> None:
     """Write the rows where the user asked for them."""
-    from colift.campaign.store import write_csv, write_parquet
+    from colift.study.campaign.store import write_csv, write_parquet
 
     if csv is not None:
         write_csv(list(rows), csv)
@@ -155,7 +155,7 @@ def resume_line(folder: Path) -> str:
 
 def say_refused(refused: Sequence[Refused]) -> None:
     """Say which cases are left out because they cannot be flown."""
-    from colift.campaign.plan import problems
+    from colift.study.campaign.plan import problems
 
     if not refused:
         return
@@ -180,7 +180,7 @@ def in_order(
 
 def end(rows: Sequence[dict[str, Any]], strict: bool) -> None:
     """End the command with the exit code of its flights; what criteria say counts if ``strict``."""
-    from colift.campaign.judge import fate
+    from colift.study.campaign.judge import fate
 
     fates = {fate(row) for row in rows}
     if "failed" in fates or (strict and "refused" in fates):

@@ -94,9 +94,9 @@ def compare(
     from colift.mission.load import parse_overrides
 
     with loading():
-        from colift.campaign import compare as study
-        from colift.campaign import judge
-        from colift.campaign.plan import Source, sift
+        from colift.study import compare as study
+        from colift.study.campaign import judge
+        from colift.study.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
         own = study.own_allocators(sources)
@@ -118,8 +118,8 @@ def compare(
         "Comparing", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
-    from colift.math.shares import interval
-    from colift.report.campaign import contest_table, write_contest
+    from colift.kernel.math.shares import interval
+    from colift.show.report.campaign import contest_table, write_contest
 
     rows = in_order(cases, outcome.rows, refused)
     contest = [row for row in rows if row["study"] == study.CONTEST]

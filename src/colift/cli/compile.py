@@ -30,7 +30,7 @@ def compile_(
       colift compile
       colift compile paper-spiral --allocator safe
     """
-    from colift.compilation import warm
+    from colift.flight.compilation import warm
     from colift.part import load_file
 
     for path in extra or []:

@@ -32,9 +32,9 @@ def feasibility(
         import numpy as np
 
         import colift
-        from colift.allocation._feasibility import SEARCHED
-        from colift.allocation._feasibility import feasibility as judge
-        from colift.allocation.safe import Safe
+        from colift.control.allocation.limits.feasibility import SEARCHED
+        from colift.control.allocation.limits.feasibility import feasibility as judge
+        from colift.control.allocation.safe import Safe
         from colift.mission.warnings import warnings_of
 
         loaded = colift.load_mission(mission, parse_overrides(sets), must_fly=False)

@@ -23,7 +23,7 @@ from colift.cli.base import (
 )
 
 if TYPE_CHECKING:
-    from colift.recording import Recording
+    from colift.record.recording import Recording
 
 
 @app.command()
@@ -58,10 +58,10 @@ def fly(
     from colift.mission.load import parse_overrides
 
     with loading():
-        from colift.live.run import fly_live
         from colift.mission import load_mission
         from colift.mission.warnings import warnings_of
         from colift.part import load_file
+        from colift.show.live.run import fly_live
 
         for path in extra or []:
             load_file(path)
@@ -70,7 +70,7 @@ def fly(
     show_warnings(warnings_of(loaded))
 
     def write(recording: Recording) -> Path:
-        from colift.runner import Run
+        from colift.flight.runner import Run
 
         flown = Run(recording=recording, loop_time=0.0, compiled=True)
         target = new_folder(loaded.name, folder)

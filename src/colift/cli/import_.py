@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from colift.cli.base import Json, app, emit, out
 
-# As in colift.importing.base, which help need not import.
+# As in colift.record.importing.base, which help need not import.
 Frame = Literal["enu", "ned"]
 Unit = Literal["m", "mm"]
 TimeUnit = Literal["s", "ms", "us", "ns"]
@@ -63,9 +63,9 @@ def import_(
       colift import cf2_01 cf7_01 --load-mass 0.0098 --out window.h5
       colift import px4.csv --frame ned --time-unit us
     """
-    from colift import metrics
     from colift.errors import SettingError
-    from colift.importing import Assumed, Reading, import_flight
+    from colift.record import metrics
+    from colift.record.importing import Assumed, Reading, import_flight
 
     try:
         assumed = Assumed(load_mass=load_mass, drone_mass=drone_mass, cable_length=cable_length)

@@ -71,8 +71,8 @@ def judge(
             raise RecordingError(f"{path}: there is no such file")
 
     with loading():
-        from colift import judgement
         from colift.part import load_file
+        from colift.study import judge as judgement
 
         for path in extra or []:
             load_file(path)
@@ -108,7 +108,7 @@ def judge(
     files = {"json": target / "judgement.json"}
     save_json(files["json"], result)
     if report:
-        from colift.report.judgement import write_page
+        from colift.show.report.judgement import write_page
 
         command = ["colift", "judge", *(path.name for path in flights)]
         command += ["--allocators", allocators] if allocators else []

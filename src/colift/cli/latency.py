@@ -32,7 +32,7 @@ def latency(
     from a compiled loop.
     """
     with loading():
-        from colift import latency as module
+        from colift.study import latency as module
     with progress("Waiting for ticks") as advance:
         result = module.run(
             n=drones, seconds=seconds, rate=rate, others=others, realtime=realtime,

@@ -54,8 +54,8 @@ def render(
     for path, suffix in ((gif, ".gif"), (mp4, ".mp4"), (png, ".png")):
         if path is not None and path.suffix != suffix:
             raise typer.BadParameter(f"{path}: the name must end in {suffix}")
-    from colift.viewer import render
-    from colift.viewer.data import load_payload
+    from colift.show.viewer import render
+    from colift.show.viewer.data import load_payload
 
     look = render.Look(_size(size), camera, theme)
     data = load_payload(recordings)

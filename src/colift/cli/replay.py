@@ -43,8 +43,8 @@ def replay(
     """
     if len(recordings) > MOST:
         raise typer.BadParameter(f"at most {MOST} recordings fit side by side")
-    from colift.viewer.data import load_payload
-    from colift.viewer.page import write_page
+    from colift.show.viewer.data import load_payload
+    from colift.show.viewer.page import write_page
 
     data = load_payload(recordings)
     path = write_page(html or new_folder("replay") / "replay.html", data)

@@ -21,10 +21,10 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Write the HTML report and the figures of a recording, of a simulation or of a real flight."""
-    from colift import metrics
-    from colift.recording import Recording
-    from colift.report.html import write_report
-    from colift.verdict import judge
+    from colift.record import metrics
+    from colift.record.recording import Recording
+    from colift.record.verdict import judge
+    from colift.show.report.html import write_report
 
     flight = Recording.load(recording)
     target = folder or (recording if recording.is_dir() else recording.with_suffix(""))

@@ -28,11 +28,15 @@ def reproduce(
     """
     check_out(folder, ("reproduction.json",))
     with loading():
-        from colift import reproduction
+        from colift.study import reproduction
     with progress("Reproducing the paper") as advance:
         result = reproduction.reproduce(advance)
     target = folder or new_folder("reproduce")
-    files = reproduction.write(result, target, report=report)
+    files = {"table": reproduction.write(result, target)}
+    if report:
+        from colift.show.report.reproduction import write_page
+
+        files["report"] = write_page(result, target)
     if as_json:
         emit({**result.as_dict(), "files": {name: str(path) for name, path in files.items()}})
         return

@@ -21,7 +21,7 @@ def results(
     as_json: Json = False,
 ) -> None:
     """Count what a campaign's file holds, also while it runs; export it as CSV or Parquet."""
-    from colift.campaign.store import Store
+    from colift.study.campaign.store import Store
 
     with Store(file) as store:
         rows = store.rows()

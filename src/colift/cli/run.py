@@ -60,7 +60,7 @@ def run(
     check_out(folder, RUN_FILES)
     with loading():
         import colift
-        from colift import metrics
+        from colift.mission.criteria import METRICS
         from colift.mission.warnings import warnings_of
         from colift.part import load_file
 
@@ -103,7 +103,7 @@ def run(
         table.add_column("value", justify="right")
         table.add_column("unit")
         table.add_column("meaning", style="dim")
-        for metric in metrics.all_metrics():
+        for metric in METRICS:
             value = f"{flown.metrics[metric.name]:.5g}"
             table.add_row(metric.name, value, metric.unit, metric.meaning)
         out.print(table)

@@ -30,7 +30,7 @@ def safety(
     """
     counts = numbers(sizes, 2, 64)
     with loading():
-        from colift import safety as module
+        from colift.study import safety as module
     with progress("Attacking and flying") as advance:
         result = module.show_all(
             counts, cycles // (10 if quick else 1), quick=quick, progress=advance

@@ -95,8 +95,8 @@ def stress(
     from colift.mission.load import parse_overrides
 
     with loading():
-        from colift.campaign import stress as study
-        from colift.campaign.plan import Source, plan
+        from colift.study import stress as study
+        from colift.study.campaign.plan import Source, plan
 
         if names:
             for name in study.condition_names():
@@ -119,9 +119,9 @@ def stress(
         "Stressing", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed,
     )  # fmt: skip
-    from colift.campaign.judge import held
-    from colift.math.shares import interval, text
-    from colift.report.stress import matrix_tables, write_stress
+    from colift.kernel.math.shares import interval, text
+    from colift.show.report.stress import matrix_tables, write_stress
+    from colift.study.campaign.judge import held
 
     rows = outcome.rows
     missions = {job.key: job.mission for _, job in planned}

@@ -82,8 +82,8 @@ def sweep(
     from colift.mission.load import parse_overrides
 
     with loading():
-        from colift.campaign import sweep as study
-        from colift.campaign.plan import Source, sift
+        from colift.study import sweep as study
+        from colift.study.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
         overs = [study.parse_over(text) for text in over]
@@ -97,9 +97,9 @@ def sweep(
         f"Sweeping {mission}", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
-    from colift.math.shares import interval
-    from colift.report.campaign import not_held, sweep_tables, write_sweep
-    from colift.report.campaign_figures import Swept
+    from colift.kernel.math.shares import interval
+    from colift.show.report.campaign import not_held, sweep_tables, write_sweep
+    from colift.show.report.campaign_figures import Swept
 
     rows = in_order(cases, outcome.rows, refused)
     swept = Swept(rows, overs)

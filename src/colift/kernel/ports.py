@@ -25,7 +25,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from colift.jit import address_of, f8, i8, matrix, vector, void
+from colift.kernel.jit import address_of, f8, i8, matrix, vector, void
 from colift.kernel.signals import ANSWER, LEGEND, Signal, named_tuple
 
 Array = NDArray[np.float64]
@@ -41,14 +41,14 @@ class Now(NamedTuple):
     dt: float
     """Since the last call, s: the physics step, or the layer's own period."""
     key: int
-    """Of this part's random numbers (:mod:`colift.math.noise`)."""
+    """Of this part's random numbers (:mod:`colift.kernel.math.noise`)."""
 
 
 class Wire(NamedTuple):
     """A kernel and all that it is called with, but for the time."""
 
     kernel: Any
-    """The function; for compiled code its address (:func:`colift.jit.address_of`)."""
+    """The function; for compiled code its address (:func:`colift.kernel.jit.address_of`)."""
     key: int
     """Of its random numbers."""
     params: Array
@@ -135,7 +135,7 @@ class Port:
     answers : bool
         Whether the kernel returns a status.
     signature : Numba signature
-        For :func:`colift.jit.kernel`.
+        For :func:`colift.kernel.jit.kernel`.
     invoke : callable
         ``invoke(wire, step, time, dt)`` calls the kernel of a :class:`Wire`, from Python or from compiled code.
 
@@ -253,3 +253,7 @@ PORTS: dict[str, Port] = {
     )
 }  # fmt: skip
 """By layer, in the order in which the loop calls them; a plant has two functions."""
+
+
+MAX_DISTURBANCES = 8
+"""Most disturbances in one mission: so many places the compiled loop has for them."""

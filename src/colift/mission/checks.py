@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from colift.actuation.base import ActuationPart
-from colift.allocation._hover import hover_conflicts
-from colift.allocation.base import AllocatorPart
+from colift.control.allocation.base import AllocatorPart
+from colift.control.allocation.limits.hover import hover_conflicts
 from colift.errors import Problem, UnknownNameError
-from colift.fault.base import FaultPart
+from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
+from colift.mission.criteria import METRICS
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Part, find, kind_of
-from colift.simulation.loop import MAX_DISTURBANCES
 from colift.wording import parse, problems_of, shown
+from colift.world.actuation.base import ActuationPart
+from colift.world.fault.base import FaultPart
 
 MAX_RECORDING = 4e9
 """Bytes that a flight may record; it is held in memory."""
@@ -146,9 +147,7 @@ def hover_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
 
 
 def _criteria_checks(frame: Frame) -> Iterable[Problem]:
-    from colift.metrics import all_metrics  # which reads recordings, and so missions
-
-    valid = [metric.name for metric in all_metrics()]
+    valid = [metric.name for metric in METRICS]
     for name, bound in frame.criteria.items():
         if name not in valid:
             yield Problem(f"criteria.{name}", "", str(UnknownNameError("metric", name, valid)))

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field, SerializeAsAny
 
-from colift.actuation.base import ActuationPart
-from colift.allocation.base import AllocatorPart
-from colift.attitude_control.base import AttitudeControlPart
-from colift.detection.base import DetectionPart
-from colift.disturbance.base import DisturbancePart
-from colift.estimation.base import EstimationPart
-from colift.fault.base import FaultPart
-from colift.link.base import LinkPart
-from colift.load_control.base import LoadControlPart
-from colift.mission.schema import Frame
+from colift.control.allocation.base import AllocatorPart
+from colift.control.attitude_control.base import AttitudeControlPart
+from colift.control.detection.base import DetectionPart
+from colift.control.estimation.base import EstimationPart
+from colift.control.load_control.base import LoadControlPart
+from colift.control.position_control.base import PositionControlPart
+from colift.control.reference.base import ReferencePart
+from colift.mission.schema import Described
 from colift.part import LISTS
-from colift.plant.base import PlantPart
-from colift.position_control.base import PositionControlPart
-from colift.reference.base import ReferencePart
-from colift.sensing.base import SensingPart
+from colift.world.actuation.base import ActuationPart
+from colift.world.disturbance.base import DisturbancePart
+from colift.world.fault.base import FaultPart
+from colift.world.link.base import LinkPart
+from colift.world.plant.base import PlantPart
+from colift.world.sensing.base import SensingPart
 
 
-class Mission(Frame):
+class Mission(Described):
     """A complete flight. Each layer's section names a part with ``kind`` and gives its settings."""
 
-    source: ClassVar[str] = "simulation"
+    @property
+    def source(self) -> str:
+        return "simulation"
+
     kinds: dict[str, str]
     """Name of the part in each layer."""
     list_kinds: dict[str, list[str]]

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from colift.geometry import ring
-from colift.part import LAYERS, Vector
+from colift.catalogue import LAYERS
 from colift.team import Team
+from colift.team.geometry import Array, ring
 
 Positive = Annotated[float, Field(gt=0.0)]
 Inertia = tuple[Positive, Positive, Positive]
@@ -282,7 +281,7 @@ class Frame(Section):
                 first.setdefault(event.value, event.field)
         return [i for i in range(self.drones.count) if first.get(i) != "drones.join"]
 
-    def start_directions(self) -> Vector:
+    def start_directions(self) -> Array:
         """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""
         drones = self.first_drones()
         if self.start.directions is None:
@@ -292,13 +291,32 @@ class Frame(Section):
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
 
 
-class RealFlight(Frame):
-    """What is known of a flight that colift did not fly: the team and the timing, no layers."""
+class Described(Frame):
+    """What a recording can tell of its mission: the frame, and by name what flew it."""
 
-    kinds: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """No part of ours flew it."""
-    source: ClassVar[str] = "flight"
+    if TYPE_CHECKING:  # fields of some, constants of others
+
+        @property
+        def kinds(self) -> Mapping[str, str]:
+            """Name of the part in each layer."""
+
+        @property
+        def source(self) -> str:
+            """``"simulation"``, or ``"flight"`` for one that was flown in the real world."""
 
     def resolved(self) -> dict[str, Any]:
         """All that is known, as plain data."""
         return self.model_dump(mode="json", exclude_none=True)
+
+
+class RealFlight(Described):
+    """What is known of a flight that colift did not fly: the team and the timing, no layers."""
+
+    @property
+    def kinds(self) -> Mapping[str, str]:
+        """No part of ours flew it."""
+        return {}
+
+    @property
+    def source(self) -> str:
+        return "flight"

@@ -1,0 +1,1 @@
+"""All that could run on a drone; it never sees the simulated world."""

@@ -1,0 +1,463 @@
+"""The contract of the allocation layer, and the object that calls any allocator by hand.
+
+An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i = -F``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from colift.errors import Problem, SettingError
+from colift.kernel.jit import address_of, f8, i8, inline, kernel, matrix, vector
+from colift.kernel.ports import PORTS, Wire
+from colift.kernel.status import Status as Status
+from colift.part import Part, Setup, Vector
+from colift.team import Team
+from colift.team.geometry import Array, ring, widest_gap
+from colift.wording import numbers, shown
+
+SIGNATURE = PORTS["allocation"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
+
+Returns a :class:`Status` as an integer. Called at the layer's own period, ``now.dt``. ``reference[2]`` is the wanted acceleration of
+the load. What it writes holds the last answer on entry, or the start formation; ``allocator_info`` has the places ``INFO_*``.
+"""
+
+_Sees, _Writes = PORTS["allocation"].Sees, PORTS["allocation"].Writes
+_invoke = PORTS["allocation"].invoke
+
+
+@inline
+def ask(address, force, reference, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+    """Call an allocator's kernel, from compiled code of studies and benchmarks, by its address."""
+    sees, writes = _Sees(force, reference), _Writes(tensions, directions, info)
+    return _invoke(Wire(address, 0, params, memory, sees, writes), 0, 0.0, dt)
+
+
+@kernel(i8(i8, vector, matrix, f8, vector, vector, vector, matrix, vector))
+def _ask(address, force, reference, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+    """:func:`ask` from Python, to which plain arrays are quicker than named tuples of them."""
+    return ask(address, force, reference, dt, params, memory, tensions, directions, info)
+
+
+INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
+INFO_SIZE = 6
+
+
+HOVER_CALLS = 1000
+"""Most calls until an allocator is taken to have settled in hover; a plain Python one is asked less often."""
+HOVER_STILL = 1e-7
+"""Change of a cable's force from call to call, over the load's weight, at which it has."""
+HOVER_PERIOD = 0.01
+"""Least time between these calls, s: ten seconds in all."""
+
+
+class Motors(Protocol):
+    """What an allocator may ask of the rotors that the team flies with."""
+
+    thrust_setting: ClassVar[str]
+    """Setting that limits the thrust, for messages."""
+
+    def thrust_limits(self, team: Team) -> Vector:
+        """Largest steady thrust of each drone (n,), N; inf where there is no limit."""
+        ...
+
+    def conflicts(self, team: Team) -> list[tuple[str, str]]:
+        """Why they cannot fly this team."""
+        ...
+
+
+class AllocatorPart(Part):
+    """Base of all allocators: settings, kernel with :data:`SIGNATURE`, parameters and memory."""
+
+    layer: ClassVar[str] = "allocation"
+    spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
+    """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
+
+    def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
+        """What the allocator minimises, N^2; NaN for one that minimises nothing."""
+        return float("nan")
+
+    def cannot_hold(self, team: Team, thrusts: Vector, directions: Array) -> list[str]:
+        """Why the team cannot hold the load in hover; empty when it can, or for all that is known.
+
+        Asked in flight when drones have left, so it takes a few milliseconds at most and calls no kernel.
+        ``thrusts`` (n,) are the drones' largest, N; ``directions`` (n, 3) are those that the drones fly now.
+        """
+        return []
+
+    def cannot_start(self, team: Team, directions: Array) -> str:
+        """Why the cables (n, 3) cannot be led from there to within its limits; empty when they can."""
+        return ""
+
+    def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
+        from colift.control.allocation.limits.hover import hover_conflicts  # which reads answers
+
+        drones = mission.first_drones()
+        told, real = mission.team.of(drones), mission.true_team.of(drones)
+        changes = [float(each.value) for each in mission.events if each.field == "load.mass"]
+        real = replace(real, load_mass=max([real.load_mass, *changes]))
+        if real.gravity == 0.0 or (
+            real.load_mass <= told.load_mass and np.all(real.masses <= told.masses)
+        ):
+            return
+        hover = self.of(drones).hover(real, mission.start_directions(), mission.timing.allocation)
+        given = mission.actuation.of(drones).thrust_limits(real)
+        for message in hover_conflicts(real, hover, given).values():
+            yield "kind", f"with what the drones really weigh and carry (truth, events) {message}"
+
+    def binding(self, team: Team, actuation: Motors) -> list[str]:
+        """Which limits keep the load from being heavier, by name and value, the costliest first."""
+        return []
+
+    def hover(self, team: Team, directions: Array, dt: float) -> Allocation:
+        """Its answer to the load's weight once it has settled, from these directions (n, 3); dt in s."""
+        allocator = Allocator(self, team, dt=max(dt, HOVER_PERIOD))
+        allocator.reset(directions=directions)
+        weight = [0.0, 0.0, team.load_mass * team.gravity]
+        compiled = hasattr(type(self).kernel, "py_func")
+        answer = allocator.allocate(weight)
+        for _ in range(HOVER_CALLS if compiled else HOVER_CALLS // 50):
+            before = answer.tensions[:, None] * answer.directions
+            answer = allocator.allocate(weight)
+            change = np.abs(answer.tensions[:, None] * answer.directions - before).max()
+            if change <= HOVER_STILL * weight[2]:
+                break
+        return answer
+
+
+class Allocation:
+    """One answer of an allocator.
+
+    Attributes
+    ----------
+    tensions : (n,) array, N
+    directions : (n, 3) array, unit vectors from drone to load, world frame
+    status : Status
+    iterations : int
+    kkt_residual : float
+        Largest violation of stationarity, relative to the scale of the problem; NaN where the
+        allocator optimises nothing.
+    objective : float
+        N^2.
+    optimality_gap : float
+        Objective minus the closed-form global optimum, N^2; NaN where no certificate applies.
+    force_residual : float
+        ``|sum T_i alpha_i + F|``, N.
+    active_limits : int
+        Bits of the limits at work, as the allocator names them; 0 for one without limits.
+    solve_time : float
+        s, of the kernel call.
+
+    """
+
+    __slots__ = ("_info", "directions", "solve_time", "status", "tensions")
+
+    def __init__(
+        self,
+        tensions: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        status: Status,
+        info: NDArray[np.float64],
+        solve_time: float,
+    ) -> None:
+        self.tensions = tensions
+        self.directions = directions
+        self.status = status
+        self.solve_time = solve_time
+        self._info = info
+
+    @property
+    def iterations(self) -> int:
+        return int(self._info[INFO_ITERATIONS])
+
+    @property
+    def kkt_residual(self) -> float:
+        return float(self._info[INFO_RESIDUAL])
+
+    @property
+    def objective(self) -> float:
+        return float(self._info[INFO_OBJECTIVE])
+
+    @property
+    def optimality_gap(self) -> float:
+        return float(self._info[INFO_GAP])
+
+    @property
+    def force_residual(self) -> float:
+        return float(self._info[INFO_BALANCE])
+
+    @property
+    def active_limits(self) -> int:
+        return int(self._info[INFO_ACTIVE])
+
+    def __repr__(self) -> str:
+        return (
+            f"Allocation(status={self.status.name}, tensions={np.round(self.tensions, 4)}, "
+            f"iterations={self.iterations}, kkt_residual={self.kkt_residual:.1e})"
+        )
+
+
+_STATUS = tuple(Status)
+_REST = np.zeros(3)
+_SHORTEST, _LONGEST = 1e-6, 1e3  # s; what lies outside, or is no number, counts as these
+
+
+class Allocator:
+    """Calls one allocator outside the simulation loop, warm-started by its own last answer.
+
+    An object belongs to one thread at a time; different objects may be called in different threads, and
+    run at the same time: a kernel does not hold Python's global lock.
+
+    Parameters
+    ----------
+    part : AllocatorPart
+        The allocator and its settings.
+    team : Team or int
+        The drones and load, or just the number of drones (then the paper's drones and load).
+    cone_deg : float
+        Half-angle of the ring that :meth:`reset` starts from, and within which :meth:`join` looks for a gap.
+    dt : float
+        Time between two calls, s, unless a call says otherwise; only allocators that limit rates use it.
+
+    Raises
+    ------
+    SettingError
+        For arguments that cannot be used; the message names them.
+
+    """
+
+    def __init__(
+        self, part: AllocatorPart, team: Team | int, *, cone_deg: float = 35.0, dt: float = 0.01
+    ) -> None:
+        if not isinstance(part, AllocatorPart):
+            raise SettingError.of("part", shown(part), "must be an allocator's settings")
+        self.part = part
+        self._whole = team if isinstance(team, Team) else Team.uniform(team)
+        self.dt = float(numbers("dt", dt, (), above=0.0))
+        self._cone = math.radians(float(numbers("cone_deg", cone_deg, (), above=0.0, below=180.0)))
+        if problems := part.wrong_lengths(self._whole.n):
+            raise SettingError([Problem(name, "", message) for name, message in problems])
+        kernel = type(part).kernel  # through the class: no binding as a method
+        self._function = address_of(kernel)
+        self._ask = _ask if self._function is not kernel else getattr(ask, "py_func", ask)
+        self._force = np.zeros(3)
+        self._reference = np.zeros((4, 3))
+        self._info = np.zeros(INFO_SIZE)
+        self._bind(range(self._whole.n))
+        self.reset()
+
+    @property
+    def n(self) -> int:
+        """Number of cables."""
+        return len(self.drones)
+
+    @property
+    def team(self) -> Team:
+        """The drones that carry, and the load."""
+        return self._team
+
+    @property
+    def drones(self) -> tuple[int, ...]:
+        """Numbers of the drones that carry, in the order of the answers; those of the team at the start."""
+        return self._drones
+
+    def _bind(self, drones: Sequence[int]) -> None:
+        self._drones = tuple(drones)
+        self._team = self._whole.of(self._drones)
+        self._tensions = np.zeros(self.n)
+        self._directions = np.zeros((self.n, 3))
+        self._params = self.part.of(self._drones).params(self._team)
+        self._memory = self.part.of(self._drones).memory(self._team)
+
+    def reset(self, directions: ArrayLike | None = None, tensions: ArrayLike | None = None) -> None:
+        """Forget the last answer and start from the given one, or from the default ring.
+
+        Parameters
+        ----------
+        directions : (n, 3) array, optional
+            From drone to load, world frame; any length but zero.
+        tensions : (n,) array, optional
+            N, not negative.
+
+        Raises
+        ------
+        SettingError
+            For a wrong shape, a value that is not finite, a zero direction or a negative tension.
+
+        """
+        n = self.n
+        start = ring(n, self._cone) if directions is None else _units(directions, (n, 3))
+        share = np.zeros(n) if tensions is None else numbers("tensions", tensions, (n,), least=0.0)
+        self._bind(self._drones)
+        self._directions[:] = start
+        self._tensions[:] = share
+
+    def update(self, **settings: Any) -> None:
+        """Change settings between two calls; the warm start is kept.
+
+        Raises
+        ------
+        SettingError
+            For an unknown setting or a value out of range; nothing is changed then.
+
+        """
+        part = type(self.part)(**{**self.part.model_dump(), **settings})
+        if problems := part.wrong_lengths(self._whole.n):
+            raise SettingError([Problem(name, "", message) for name, message in problems])
+        self.part = part
+        self._params[:] = part.of(self._drones).params(self._team)
+
+    def lose(self, drone: int) -> None:
+        """Go on without one drone, now; the others keep their numbers and their warm start.
+
+        Raises
+        ------
+        SettingError
+            For a drone that does not carry, or the last one.
+
+        """
+        rest = [other for other in self._drones if other != drone]
+        if len(rest) == self.n:
+            carrying = ", ".join(map(str, self._drones))
+            raise SettingError.of(
+                "drone", shown(drone), f"must be one of those that carry: {carrying}"
+            )
+        if not rest:
+            raise SettingError.of("drone", shown(drone), "is the last one that carries")
+        self._go_on(rest)
+
+    def join(self, drone: int | None = None, direction: ArrayLike | None = None) -> int:
+        """Take a drone of the team back in, now; the others keep their warm start.
+
+        Parameters
+        ----------
+        drone : int, optional
+            Its number in the team at the start; the lowest that does not carry when left out.
+        direction : (3,) array, optional
+            Of its cable, from drone to load, world frame; the widest gap between the others' when left out.
+
+        Returns
+        -------
+        int
+            The drone's number.
+
+        Raises
+        ------
+        SettingError
+            For a drone that carries already or is not of the team, or a direction that is none.
+
+        """
+        away = [other for other in range(self._whole.n) if other not in self._drones]
+        if drone is None and away:
+            drone = away[0]
+        if drone not in away:
+            others = ", ".join(map(str, away)) or "none"
+            raise SettingError.of(
+                "drone", shown(drone), f"must be one of those that do not carry: {others}"
+            )
+        cable = self._gap() if direction is None else _units(direction, (3,), "direction")
+        self._go_on(sorted([*self._drones, drone]))
+        self._directions[self._drones.index(drone)] = cable
+        return int(drone)
+
+    def _gap(self) -> NDArray[np.float64]:
+        """Where a cable that joins is hung: as far from the others as the start's cone has room."""
+        return widest_gap(self._directions, self._cone)
+
+    def _go_on(self, drones: Sequence[int]) -> None:
+        """With these drones, as a flight does: who stays keeps its row, and the kernel what it remembers."""
+        before, tensions, directions, memory = (
+            self._drones, self._tensions, self._directions, self._memory,
+        )  # fmt: skip
+        self._bind(drones)
+        places = np.array([before.index(d) if d in before else -1 for d in drones], dtype=np.int64)
+        stay = places >= 0
+        self._tensions[stay] = tensions[places[stay]]
+        self._directions[stay] = directions[places[stay]]
+        self._memory = self.part.carry_over(memory, self._memory, places)
+
+    def allocate(
+        self,
+        force: ArrayLike,
+        acceleration: ArrayLike | None = None,
+        dt: float | None = None,
+    ) -> Allocation:
+        """Share ``force`` among the cables.
+
+        Parameters
+        ----------
+        force : (3,) array
+            Total force that the cables must exert on the load, world frame, N.
+        acceleration : (3,) array, optional
+            Wanted acceleration of the load, m/s^2, for allocators that respect thrust limits;
+            zero when left out.
+        dt : float, optional
+            Time since the last call, s, for allocators that limit rates; the allocator's own ``dt`` when
+            left out. What is not positive, or no number, counts as no time at all: nothing turns.
+
+        Returns
+        -------
+        Allocation
+            Always usable, whatever the force: see its ``status``.
+
+        Raises
+        ------
+        SettingError
+            Only when ``force`` or ``acceleration`` is not three numbers, or ``dt`` not one.
+
+        """
+        try:
+            wanted = np.asarray(force, dtype=float)
+            motion = _REST if acceleration is None else np.asarray(acceleration, dtype=float)
+            period = min(_LONGEST, max(_SHORTEST, self.dt if dt is None else float(dt)))
+        except (TypeError, ValueError):
+            wanted = motion = np.empty(0)
+        if wanted.shape != (3,) or motion.shape != (3,):
+            numbers("force", force, (3,), finite=False)
+            numbers(
+                "acceleration", _REST if acceleration is None else acceleration, (3,), finite=False
+            )
+            numbers("dt", self.dt if dt is None else dt, (), finite=False)
+        self._force[:] = wanted
+        self._reference[2] = motion
+        start = perf_counter()
+        status = self._ask(
+            self._function,
+            self._force,
+            self._reference,
+            period,
+            self._params,
+            self._memory,
+            self._tensions,
+            self._directions,
+            self._info,
+        )
+        elapsed = perf_counter() - start
+        return Allocation(
+            self._tensions.copy(),
+            self._directions.copy(),
+            _STATUS[status],
+            self._info.copy(),
+            elapsed,
+        )
+
+
+def _units(
+    directions: ArrayLike, shape: tuple[int, ...], name: str = "directions"
+) -> NDArray[np.float64]:
+    """Directions of any length but zero, as unit vectors."""
+    found = numbers(name, directions, shape)
+    norms = np.linalg.norm(found, axis=-1, keepdims=True)
+    if not (np.isfinite(norms) & (norms > 0.0)).all():
+        raise SettingError.of(
+            name, shown(found.tolist()), "must have lengths that are finite and not zero"
+        )
+    return np.asarray(found / norms)

@@ -1,0 +1,608 @@
+"""One cycle of the safe allocator: from the last answer to the next, inside every limit.
+
+The stages, each a function below: order the cables, set up each cable's limits, lead a
+violated configuration back (:mod:`colift.control.allocation.limits.recovery`), list the near pairs, iterate.
+
+Pairs. A direction turns by at most ``delta`` per cycle, so only pairs closer than ``min_angle + 2 delta``
+can come too close in this cycle. Those within ``min_angle + reach`` are listed, and the weight of their
+barrier fades to zero at that distance, so that nothing jumps when a pair enters or leaves.
+
+This file imports only the compiler front end.
+"""
+
+from __future__ import annotations
+
+import math
+
+from colift.control.allocation.limits import newton, recovery
+from colift.control.allocation.paper.newton import rotate
+from colift.kernel.jit import inline
+
+(
+    MU,
+    MU_SCALED,
+    MU_FORCE,
+    SIGMA,
+    KAPPA,
+    KAPPA_RATE,
+    KAPPA_PAIR,
+    MIN_ANGLE,
+    REACH,
+    MAX_RATE,
+    SETTLING,
+    TURNING,
+    PRICE,
+    TOLERANCE,
+    ITERATIONS,
+    LIMITS,
+    GRAVITY,
+    CONE,
+    TILT,
+    TOTAL,
+    EQUAL,
+) = range(21)
+"""Places in the parameter vector; HEAD of them, then PER_CABLE values for each cable."""
+HEAD = 24
+PER_CABLE = 5
+"""Weight, least and largest tension (N), mass (kg), largest thrust (N)."""
+
+MAX_TURN = 0.5
+"""Largest turn of a direction in one cycle, rad, however long the cycle."""
+
+A, OMEGA, T_MIN, T_MAX = newton.A, newton.OMEGA, newton.T_MIN, newton.T_MAX
+COS_CONE, VERS_RATE, P = newton.COS_CONE, newton.VERS_RATE, newton.P
+F_MAX, COS_TILT = newton.F_MAX, newton.COS_TILT
+
+CONVERGED, ITERATION_LIMIT, FORCE_REDUCED = 0, 1, 2
+
+TURN = 0.4
+"""Largest turn of the formation in one cycle, in turns of the rate limit."""
+JUMP = 0.2
+"""Distance between force and direction followed, rad, from which on the formation waits."""
+KEEP = 0.05
+"""Part of its margin that every limit keeps in one step."""
+Z_BAND = 10.0
+"""Multipliers stay within this factor of kappa / g."""
+BALANCED = 1e-10
+"""Error of the force balance that counts as none, in shares of the load."""
+PATIENCE = 6
+"""Steps without the whole force, those at its price twice, after which nothing but force is asked for."""
+FORCE = 0.5
+"""Price of horizontal force then."""
+VERTICAL_FIRST = 20.0
+"""How much dearer vertical force is than horizontal force."""
+FIRM = 1e-3
+"""Barrier of every limit then."""
+RATE_FIRM = 0.5
+"""Barrier of the rate then, in the versine of the largest turn; no more than that of the others."""
+SHARP = 0.03
+"""Part that is left in the end of what holds on to the last directions."""
+FAR = 10.0
+"""How much more than barriers can be blamed for is missing where that is done."""
+LEAN = 0.03
+"""Part of the largest turn by which a formation leans then, lest it be stuck at a saddle."""
+LEANING = 50.0
+"""Cycles for which it does so after the wanted force has changed by more than ``CHANGE`` of it."""
+CHANGE = 1e-3
+SLIGHT = 1e-3
+"""Largest part of the cost that is left then."""
+RETRIES = 8
+"""Most step lengths tried in one iteration."""
+
+
+@inline
+def sort_cables(n, directions, order):  # type: ignore[no-untyped-def]
+    """Order the cables along the x axis, from the last cycle's order: neighbours get close numbers.
+
+    Small teams keep their own order: their matrix is dense anyhow.
+    """
+    total = 0
+    for i in range(n):
+        total += order[i]
+    if total != n * (n - 1) // 2 or n <= 8:
+        for i in range(n):
+            order[i] = i
+    if n <= 8:
+        return
+    for i in range(1, n):
+        moving = order[i]
+        key = directions[moving, 0]
+        j = i - 1
+        while j >= 0 and directions[order[j], 0] > key:
+            order[j + 1] = order[j]
+            j -= 1
+        order[j + 1] = moving
+
+
+@inline
+def turn_home(n, fx, fy, fz, W, follow, most, data, facing, homes, spare):  # type: ignore[no-untyped-def]
+    """Turn the directions that the proximal term holds on to with the force, which is followed smoothly.
+
+    ``facing`` (3,) is the direction followed so far, zero at the start; ``follow`` the share of the way to
+    that of the force, ``most`` the largest turn, rad. Noise moves no cable, a manoeuvre turns the whole
+    formation, and a jump is waited out: it may jump back. The barrier of the rate holds on to the last
+    directions as strongly as the proximal term (``RATE_BARRIER``), and does not turn: twice the turn
+    puts the middle of both where it should be.
+    """
+    x, y, z = fx / W, fy / W, fz / W
+    ax, ay, az = facing[0], facing[1], facing[2]
+    if ax * ax + ay * ay + az * az > 0.5:
+        x, y, z = x - ax, y - ay, z - az
+        size = math.sqrt(x * x + y * y + z * z)
+        follow = min(follow, most / max(size, 1e-300)) / (1.0 + (size / JUMP) ** 4)
+        x, y, z = ax + follow * x, ay + follow * y, az + follow * z
+        norm = math.sqrt(x * x + y * y + z * z)
+        if norm < 1e-3:
+            return
+        x, y, z = x / norm, y / norm, z / norm
+        for i in range(n):
+            for k in range(3):
+                homes[3 * i + k] = data[newton.DATA * i + newton.HOME + k]
+        for _ in range(2):
+            rotate(n, ax, ay, az, x, y, z, homes, spare)
+        for i in range(n):
+            for k in range(3):
+                data[newton.DATA * i + newton.HOME + k] = homes[3 * i + k]
+    facing[0], facing[1], facing[2] = x, y, z
+
+
+@inline
+def set_up(  # type: ignore[no-untyped-def]
+    n, order, W, unit, delta, acceleration, tensions, directions, params, data, T, start, alpha, w
+):
+    """Limits of every cable in this cycle and a strictly feasible ``w``; whether one was relaxed."""
+    vers = 2.0 * math.sin(0.5 * delta) ** 2
+    cos_cone = math.cos(params[CONE])
+    for i in range(n):
+        x, y, z = directions[order[i], 0], directions[order[i], 1], directions[order[i], 2]
+        norm = math.sqrt(x * x + y * y + z * z)
+        if not (norm > 1e-9 and norm < 1e9):
+            x, y, z, norm = 0.0, 0.0, -1.0, 1.0
+        norm = 1.0 / norm
+        start[3 * i] = x * norm
+        start[3 * i + 1] = y * norm
+        start[3 * i + 2] = z * norm
+    for k in range(3 * n):
+        alpha[k] = start[k]
+    relaxed = False
+    if recovery.is_broken(n, math.cos(params[MIN_ANGLE]), cos_cone, recovery.SURE, start):
+        relaxed = True
+        recovery.lead_back(n, params[MIN_ANGLE], params[CONE], delta, start, alpha)
+    for i in range(n):
+        d = newton.DATA * i
+        p = HEAD + PER_CABLE * order[i]
+        for k in range(3):
+            data[d + k] = start[3 * i + k]
+            data[d + newton.HOME + k] = alpha[3 * i + k]
+        low = params[p + 1] * unit
+        high = params[p + 2] * unit
+        data[d + OMEGA] = params[p]
+        data[d + T_MIN] = low
+        data[d + T_MAX] = high
+        data[d + VERS_RATE] = vers
+        # A cable outside the cone: no worse than half of the way that recovery gained.
+        data[d + COS_CONE] = cos_cone
+        if -alpha[3 * i + 2] - cos_cone <= recovery.SURE:
+            middle = -0.5 * (alpha[3 * i + 2] + start[3 * i + 2])
+            data[d + COS_CONE] = min(cos_cone, min(middle, -alpha[3 * i + 2] - recovery.ROOM))
+        t = tensions[order[i]] * unit
+        if not (t > 0.0 and t < 1e300):
+            t = W / n
+        room = 1e-3 * (high - low)
+        low += room
+        t = max(min(t, high - room), low)
+        if params[LIMITS] > 4.0:
+            cos_tilt = math.cos(params[TILT])
+            drone_limits(
+                d,
+                params[p + 3] * unit,
+                params[p + 4] * unit,
+                params[GRAVITY],
+                params[TILT],
+                acceleration,
+                data,
+            )
+            px, py, pz = data[d + P], data[d + P + 1], data[d + P + 2]
+            for k in range(8):
+                x = px - t * alpha[3 * i]
+                y = py - t * alpha[3 * i + 1]
+                z = pz - t * alpha[3 * i + 2]
+                thrust = math.sqrt(x * x + y * y + z * z)
+                if data[d + F_MAX] - thrust > 1e-6 and z - cos_tilt * thrust > 1e-6:
+                    break
+                if k < 7:
+                    t = low + 0.4 * (t - low) if k < 6 else low
+                else:
+                    # Even the least tension asks too much of this drone.
+                    relaxed = True
+                    data[d + F_MAX] = max(data[d + F_MAX], thrust * 1.001)
+                    data[d + COS_TILT] = min(data[d + COS_TILT], z / thrust - 1e-3)
+        T[i] = t
+        for k in range(3):
+            w[3 * i + k] = t * alpha[3 * i + k]
+    return relaxed
+
+
+@inline
+def breaks_a_limit(n, order, unit, params, data, T, alpha):  # type: ignore[no-untyped-def]
+    """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
+    cos_angle, cos_cone = math.cos(params[MIN_ANGLE]), math.cos(params[CONE])
+    if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, alpha):
+        return True
+    if params[LIMITS] > 4.0:
+        cos_tilt = math.cos(params[TILT])
+        for i in range(n):
+            d = newton.DATA * i
+            x = data[d + P] - T[i] * alpha[3 * i]
+            y = data[d + P + 1] - T[i] * alpha[3 * i + 1]
+            z = data[d + P + 2] - T[i] * alpha[3 * i + 2]
+            thrust = math.sqrt(x * x + y * y + z * z)
+            most = params[HEAD + PER_CABLE * order[i] + 4] * unit
+            if thrust > most * (1.0 + recovery.ROUNDING):
+                return True
+            if z < (cos_tilt - recovery.ROUNDING) * thrust:
+                return True
+    return False
+
+
+@inline
+def drone_limits(d, mass, thrust, gravity, tilt, acceleration, data):  # type: ignore[no-untyped-def]
+    """The thrust ``p`` that a drone needs for itself, brought within what it can do, and its limits.
+
+    An acceleration that the drone cannot follow even without a cable gives way here.
+    """
+    ax, ay, az = acceleration[0], acceleration[1], acceleration[2]
+    if not math.isfinite(ax + ay + az):
+        ax, ay, az = 0.0, 0.0, 0.0
+    x = mass * ax
+    y = mass * ay
+    z = min(max(mass * (az + gravity), 0.3 * mass * gravity), 0.8 * thrust)
+    level = math.sqrt(x * x + y * y)
+    most = z * math.tan(0.8 * tilt)
+    if level > most:
+        x *= most / level
+        y *= most / level
+    size = math.sqrt(x * x + y * y + z * z)
+    scale = 0.9 * thrust / size if size > 0.9 * thrust else 1.0
+    data[d + P] = x * scale
+    data[d + P + 1] = y * scale
+    data[d + P + 2] = z * scale
+    data[d + F_MAX] = thrust
+    data[d + COS_TILT] = math.cos(tilt)
+
+
+@inline
+def near_pairs(n, min_angle, reach, kappa, start, alpha, pairs, first, kappa_pair, cos_max):  # type: ignore[no-untyped-def]
+    """List the pairs ``(i, j)``, ``j < i``, closer than ``min_angle + reach``; their number.
+
+    ``first[i]`` becomes the first neighbour of cable i: the envelope of the sparse matrix. A pair that
+    is too close may not come closer than half of the way that recovery gained.
+    """
+    limit = math.cos(min_angle)
+    edge = math.cos(min(min_angle + reach, math.pi))
+    scale = 1.0 / (limit - edge)
+    m = 0
+    for i in range(n):
+        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        first[i] = i
+        for j in range(i):
+            c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
+            if c > edge:
+                if first[i] == i:
+                    first[i] = j
+                pairs[2 * m] = i
+                pairs[2 * m + 1] = j
+                fade = min((c - edge) * scale, 1.0)
+                fade *= 2.0 - fade
+                kappa_pair[m] = kappa * fade * fade
+                cos_max[m] = limit
+                if limit - c <= recovery.SURE:
+                    old = start[3 * i] * start[3 * j] + start[3 * i + 1] * start[3 * j + 1]
+                    old += start[3 * i + 2] * start[3 * j + 2]
+                    cos_max[m] = max(limit, max(0.5 * (old + c), c + recovery.ROOM))
+                    kappa_pair[m] = min(kappa_pair[m], recovery.FIRM * (cos_max[m] - c))
+                m += 1
+    return m
+
+
+@inline
+def active_limits(n, limits, m, z):  # type: ignore[no-untyped-def]
+    """Bit k is set when a limit of kind k (bit 6: pairs) pushes with more than a tenth of a share."""
+    bits = 0
+    for i in range(n):
+        for k in range(limits):
+            if z[newton.LIMITS * i + k] > 0.1:
+                bits |= 1 << k
+    for k in range(m):
+        if z[newton.LIMITS * n + k] > 0.1:
+            bits |= 64
+    return float(bits)
+
+
+@inline
+def slight_cost(n, mu, rho, data):  # type: ignore[no-untyped-def]
+    """Part of the cost at which no marginal cost of it, of any cable, comes near the price of force."""
+    worst = max(2.0 * n * mu, rho * math.sqrt(2.0 * data[newton.VERS_RATE]))
+    for i in range(n):
+        worst = max(worst, data[newton.DATA * i + OMEGA] * data[newton.DATA * i + T_MAX])
+    return min(SLIGHT, 0.1 * FORCE / worst)
+
+
+@inline
+def iterate(  # type: ignore[no-untyped-def]
+    n,
+    limits,
+    m,
+    fx,
+    fy,
+    fz,
+    mu,
+    rho,
+    kappa,
+    kappa_rate,
+    spread,
+    price,
+    yielding,
+    leaning,
+    tolerance,
+    max_iterations,
+    pairs,
+    first,
+    kappa_pair,
+    cos_max,
+    data,
+    T,
+    alpha,
+    w,
+    dw,
+    w_new,
+    g,
+    g_new,
+    z,
+    rows,
+    K,
+    Y,
+    S,
+    lam,
+    M,
+    info,
+):
+    """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above.
+
+    Two phases. In the first the objective is the whole cost, and force may be missing at a price.
+    Where that does not balance the force soon, the second phase asks for the force only: the cost is
+    made slight, and every barrier small against the price. As soon as the force is balanced the whole cost is
+    back, and no price is high enough to give force up again: each step keeps the balance. Where much is
+    missing, what holds on to the last directions shrinks in the end to the part ``SHARP``, so that the cables turn as
+    far as their rate allows. ``yielding`` starts with the second phase, in which the formation leans by ``leaning`` rad.
+    """
+    newton.margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g)
+    spread_now = spread
+    iterations = 0
+    waited = 0
+    held = False
+    sharp = False
+    leant = False
+    fresh = True
+    bounded = False
+    residual = math.inf
+    balance = math.inf
+    missing = 0.0
+    outcome = ITERATION_LIMIT
+    shift = 0.0
+    attempts = 0
+    cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
+    bound_h, bound_v = price, price * VERTICAL_FIRST
+    level = 1.0
+    while True:
+        rx, ry, rz = fx, fy, fz
+        for i in range(n):
+            rx += w[3 * i]
+            ry += w[3 * i + 1]
+            rz += w[3 * i + 2]
+        balance = math.sqrt(rx * rx + ry * ry + rz * rz)
+        if balance <= BALANCED and not held:
+            held = True
+            bound_h = bound_v = math.inf
+            if yielding:
+                yielding = False
+                fresh = True
+        elif not held and not yielding and waited >= PATIENCE:
+            yielding = True
+            fresh = True
+        if fresh:
+            # A phase begins: its weights, and multipliers as if this were the middle of its path.
+            if leaning > 0.0 and yielding != leant:
+                leant = yielding
+                lean(n, leaning if leant else -leaning, data)
+            if yielding:
+                cost = slight_cost(n, mu, rho, data)
+                mu_now, rho_now = cost * mu, cost * rho
+                kappa_now, rate_now = FIRM, min(FIRM, RATE_FIRM * data[newton.VERS_RATE])
+                bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
+                spread_next = FIRM
+            else:
+                cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
+                spread_next = spread
+            ratio = spread_next / spread_now
+            spread_now = spread_next
+            for i in range(n):
+                for k in range(limits):
+                    weight = rate_now if k == newton.RATE else kappa_now
+                    z[newton.LIMITS * i + k] = weight / g[newton.LIMITS * i + k]
+            for k in range(m):
+                kappa_pair[k] *= ratio
+                z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
+        newton.assemble(
+            n,
+            limits,
+            m,
+            pairs,
+            cost,
+            mu_now,
+            rho_now,
+            kappa_now,
+            rate_now,
+            kappa_pair,
+            data,
+            T,
+            alpha,
+            g,
+            z,
+            M,
+            rows,
+            K,
+            first,
+        )
+        if iterations > 0:
+            residual = newton.stationarity(n, alpha, rows, lam)
+            if not fresh and yielding and residual <= tolerance * level:
+                missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
+                blamed = FIRM * (limits * n + m)
+                if missing <= blamed and level < 1e3:
+                    level *= 10.0
+                    bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
+                elif not sharp and missing > FAR * blamed:
+                    # The turn is to be used to the full where much force is given up.
+                    sharp = True
+                    rate_now *= SHARP
+                    rho_now *= SHARP
+                else:
+                    outcome = FORCE_REDUCED
+                    break
+            if not fresh and not yielding and residual <= tolerance and held:
+                outcome = CONVERGED
+                break
+            if iterations >= max_iterations:
+                break
+        fresh = False
+        if not newton.factor(n, shift, mu_now, T, alpha, rows, K, first, Y):
+            # Not convex here: build again, with a larger shift.
+            shift = max(1e-2, 30.0 * shift)
+            attempts += 1
+            if attempts > 12:
+                break
+            continue
+        attempts = 0
+        iterations += 1
+        newton.reduced_system(n, alpha, rows, Y, rx, ry, rz, S)
+        bounded = newton.multiplier(S, bound_h, bound_v)
+        newton.back_substitute(n, alpha, rows, K, first, Y, S, dw)
+        lam[0] = S[69]
+        lam[1] = S[70]
+        lam[2] = S[71]
+        s = longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, g_new)
+        for k in range(3 * n):
+            w[k] = w_new[k]
+        for i in range(n):
+            for k in range(limits):
+                weight = rate_now if k == newton.RATE else kappa_now
+                c = newton.LIMITS * i + k
+                update_multiplier(c, weight, s, g, g_new, z)
+        for k in range(m):
+            update_multiplier(newton.LIMITS * n + k, kappa_pair[k], s, g, g_new, z)
+        waited += 2 if bounded else 1
+        shift = 0.1 * shift if shift > 1e-2 else 0.0
+        if s == 0.0:
+            shift = max(1.0, 100.0 * shift)
+    info[0] = iterations
+    info[1] = residual
+    info[4] = balance
+    return outcome
+
+
+@inline
+def lean(n, turn, data):  # type: ignore[no-untyped-def]
+    """Turn what the proximal term holds on to by a little, rad, each cable another way.
+
+    A symmetric formation may be a saddle, which nothing symmetric ever leaves.
+    """
+    for i in range(n):
+        home = newton.DATA * i + newton.HOME
+        angle = 2.399963229728653 * i + 1.0
+        data[home] += turn * math.cos(angle)
+        data[home + 1] += turn * math.sin(angle)
+
+
+@inline
+def leaning_now(fx, fy, fz, W, delta, yielded, asked):  # type: ignore[no-untyped-def]
+    """By how much to :func:`lean`, rad; ``yielded`` counts the cycles with this force that gave force up."""
+    dx, dy, dz = fx - asked[0], fy - asked[1], fz - asked[2]
+    asked[0], asked[1], asked[2] = fx, fy, fz
+    if math.sqrt(dx * dx + dy * dy + dz * dz) > CHANGE * W:
+        yielded[0] = 1.0
+    return LEAN * delta if yielded[0] <= LEANING else 0.0
+
+
+@inline
+def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, g_new):  # type: ignore[no-untyped-def]
+    """Longest step, at most 1, that leaves every limit the part ``KEEP`` of its margin; 0 if none.
+
+    Along a step most limits are concave, so that their secant gives a step that keeps them. Pairs and the least
+    tension are not, but they are nearly linear within what the other limits allow. On return
+    ``w_new``, ``T``, ``alpha`` and ``g_new`` belong to that step.
+    """
+    s = 1.0
+    for trial in range(RETRIES + 1):
+        if trial == RETRIES:
+            s = 0.0
+            for k in range(3 * n):
+                w_new[k] = w[k]
+        else:
+            for k in range(3 * n):
+                w_new[k] = w[k] + s * dw[k]
+        newton.margins(n, limits, m, pairs, cos_max, data, w_new, T, alpha, g_new)
+        if s == 0.0:
+            break
+        ratio = 1.0
+        for i in range(n):
+            for kind in range(limits):
+                k = newton.LIMITS * i + kind
+                if g_new[k] >= KEEP * g[k]:
+                    continue
+                step = 0.99 * (1.0 - KEEP) * g[k] / (g[k] - g_new[k]) * s
+                d = newton.DATA * i
+                if kind == newton.RATE or (kind == newton.CONE and data[d + COS_CONE] > 0.0):
+                    ux, uy, uz, c = 0.0, 0.0, -1.0, data[d + COS_CONE]
+                    kept = KEEP * g[k]
+                    if kind == newton.RATE:
+                        ux, uy, uz = data[d], data[d + 1], data[d + 2]
+                        c, kept = 1.0 - data[d + VERS_RATE] + kept, 0.0
+                    x, y, z = w[3 * i], w[3 * i + 1], w[3 * i + 2]
+                    dx, dy, dz = dw[3 * i], dw[3 * i + 1], dw[3 * i + 2]
+                    step = 0.999 * cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz)
+                ratio = min(ratio, step / s) if step < s else min(ratio, 0.5)
+        if ratio == 1.0:
+            for k in range(newton.LIMITS * n, newton.LIMITS * n + m):
+                if not g_new[k] >= KEEP * g[k]:
+                    ratio = min(ratio, 0.99 * (1.0 - KEEP) * g[k] / (g[k] - g_new[k]))
+        if ratio == 1.0:
+            break
+        s *= ratio if ratio > 0.0 else 0.25
+    return s
+
+
+@inline
+def cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Longest step that leaves ``u.w - c |w|`` no less than ``kept``, of which there is more now.
+
+    The smallest positive root of ``(u.(w + s dw) - kept)^2 = c^2 |w + s dw|^2``.
+    """
+    far = c * math.sqrt(x * x + y * y + z * z)
+    near = ux * x + uy * y + uz * z - kept
+    slope = ux * dx + uy * dy + uz * dz
+    constant = (near - far) * (near + far)
+    linear = near * slope - c * c * (x * dx + y * dy + z * dz)
+    square = slope * slope - c * c * (dx * dx + dy * dy + dz * dz)
+    root = math.sqrt(max(linear * linear - square * constant, 0.0)) - linear
+    return constant / root if root > constant else 1.0
+
+
+@inline
+def update_multiplier(c, kappa, s, g, g_new, z):  # type: ignore[no-untyped-def]
+    """Newton step of ``z g = kappa`` with the change of ``g`` that took place; safeguarded."""
+    old, new, multiplier = g[c], g_new[c], z[c]
+    multiplier += s * (kappa / old - multiplier) - multiplier * (new - old) / old
+    central = kappa / new
+    z[c] = min(max(multiplier, central / Z_BAND), central * Z_BAND)
+    g[c] = new

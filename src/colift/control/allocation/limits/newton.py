@@ -1,0 +1,577 @@
+"""The safe allocation problem: primal-dual interior-point steps at the cost of a sparse 2n system.
+
+Problem, in *force coordinates* ``w_i = T_i alpha_i`` (the pull of drone i on the load is ``-w_i``), scaled by
+``sigma = m_L g / n``. With weights ``omega_i``, the last answer's directions ``a_i`` (``b_i``: the same, turned
+with the force, or after recovery has moved those outside a limit) and the thrust ``p_i - w_i`` of each drone,
+``p_i = m_i (g e3 + a_d)``::
+
+    min  1/2 sum omega_i T_i^2 + mu sum_{i<j} c_ij^2            (the paper's eq. 7)
+         + rho/2 sum |alpha_i - b_i|^2 + elastic(s)             (tie-break; force gives way)
+    s.t. sum w_i + F = s
+         TENSION_MAX   T_max - |w|                     >= 0     concave
+         TENSION_MIN   |w| - T_min                     >= 0     not concave
+         CONE          d.w - cos(cone) |w|             >= 0     concave, d = -e3
+         RATE          a.alpha - cos(delta)            >= 0     delta = max_rate dt
+         THRUST        f_max - |p - w|                 >= 0     concave
+         TILT          e3.(p - w) - cos(tilt) |p - w|  >= 0     concave
+         PAIR          cos(min_angle) - alpha_i.alpha_j >= 0    not concave
+
+Every limit is kept strictly by every iterate: limits hold whenever the iteration is stopped.
+
+Barrier. Each limit ``g >= 0`` has a fixed small barrier ``kappa``: multiplier ``z`` with ``z g = kappa``. The
+barrier of the pairs is the tie-break that spreads the cables: of the (2n-5)-dimensional family of
+optima (:mod:`colift.control.allocation.paper.newton`) it picks a wide one. Since the last answer is central,
+``z = kappa / g`` is its multiplier: nothing but the answer itself has to be remembered.
+
+Step. In the frame ``(alpha_i, B_i)`` of each cable, ``dw_i = tau_i alpha_i + B_i eta_i``. A function
+``phi`` of the direction alone has gradient ``gamma/T`` (``gamma = B^T dphi/dalpha``), Hessian ``H/T^2`` on ``eta``
+and ``-gamma/T^2`` between ``tau`` and ``eta``. The balance is linear: one full step closes it
+exactly, and its multiplier ``lam`` enters no Hessian. ``tau_i`` eliminates itself; what is left per
+cable is ``C_i`` (2x2), ``q_i``, ``P_i = B_i - alpha_i h_i^T / h_tt`` (3x2), and ``G_i`` (5x2), the coordinates of
+``sqrt(mu) d(alpha alpha^T)``: the penalty couples all cables, but with rank 5 only. With ``K`` = ``C_i`` on the
+diagonal and the near pairs' 2x2 blocks, and ``U_i = [G_i; P_i]``, ::
+
+    (blkdiag(I_5, sum alpha alpha^T / h_tt) + U K^-1 U^T) [zeta; lam] = rhs
+
+Each cable has few near neighbours, so ``K`` is factored inside its envelope, the cables ordered
+along one horizontal axis. If it is not positive definite, ``K + shift I`` is.
+
+Elastic force. ``s`` costs ``E_h |s_h| + E_v |s_v|``; the dual of that is the bound ``|lam_h| <= E_h``, ``|lam_v| <= E_v``
+on the multiplier, a problem in three unknowns after the elimination. Inside the bound ``s = 0`` exactly. Since
+``E_v >> E_h``, the horizontal part gives way first. When the bounds rise and fall: :func:`colift.control.allocation.limits.cycle.iterate`.
+
+Source: own derivation; interior point as in Nocedal and Wright, Numerical Optimization, ch. 19.
+This file imports only the compiler front end.
+"""
+
+from __future__ import annotations
+
+import math
+
+from colift.kernel.jit import inline
+
+TENSION_MAX, TENSION_MIN, CONE, RATE, THRUST, TILT = range(6)
+LIMITS = 6
+"""Limits of one cable."""
+
+DATA = 16
+"""Per cable and cycle: a (3), omega, T_min, T_max, cos cone, 1 - cos delta, p (3), f_max, cos tilt, b (3)."""
+A, OMEGA, T_MIN, T_MAX, COS_CONE, VERS_RATE = 0, 3, 4, 5, 6, 7
+P, F_MAX, COS_TILT, HOME = 8, 11, 12, 13
+
+ROW = 20
+"""Per cable and step: B (6), gamma and its barrier version (4), C (3), q (2), h (2), h_tt, r_t, curvature."""
+
+RHS = 9
+"""Columns of the right-hand side: zeta (5), lam (3), q."""
+
+SYSTEM = 8 * 8 + 8
+
+
+@inline
+def margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g):  # type: ignore[no-untyped-def]
+    """From ``w``: tensions, directions and the value of every limit, cables first, then pairs.
+
+    False as soon as one limit is not strictly positive (or not a number); ``g`` is filled all the same.
+    """
+    for i in range(n):
+        d = DATA * i
+        x = w[3 * i]
+        y = w[3 * i + 1]
+        z = w[3 * i + 2]
+        t = math.sqrt(x * x + y * y + z * z)
+        inverse = 1.0 / max(t, 1e-300)
+        ax = x * inverse
+        ay = y * inverse
+        az = z * inverse
+        T[i] = t
+        alpha[3 * i] = ax
+        alpha[3 * i + 1] = ay
+        alpha[3 * i + 2] = az
+        o = LIMITS * i
+        dx = ax - data[d]
+        dy = ay - data[d + 1]
+        dz = az - data[d + 2]
+        versine = 0.5 * (dx * dx + dy * dy + dz * dz)
+        g[o] = data[d + T_MAX] - t
+        g[o + 1] = t - data[d + T_MIN]
+        g[o + 2] = -z - data[d + COS_CONE] * t
+        g[o + 3] = data[d + VERS_RATE] - versine
+        if limits > 4:
+            fx = data[d + P] - x
+            fy = data[d + P + 1] - y
+            fz = data[d + P + 2] - z
+            thrust = math.sqrt(fx * fx + fy * fy + fz * fz)
+            g[o + 4] = data[d + F_MAX] - thrust
+            g[o + 5] = fz - data[d + COS_TILT] * thrust
+    o = LIMITS * n
+    for k in range(m):
+        i = 3 * pairs[2 * k]
+        j = 3 * pairs[2 * k + 1]
+        g[o + k] = cos_max[k] - (
+            alpha[i] * alpha[j] + alpha[i + 1] * alpha[j + 1] + alpha[i + 2] * alpha[j + 2]
+        )
+
+
+@inline
+def assemble(  # type: ignore[no-untyped-def]
+    n,
+    limits,
+    m,
+    pairs,
+    cost,
+    mu,
+    rho,
+    kappa,
+    kappa_rate,
+    kappa_pair,
+    data,
+    T,
+    alpha,
+    g,
+    z,
+    M,
+    rows,
+    K,
+    first,
+):
+    """Gradient and Hessian at ``(T, alpha)``: fills ``rows`` and the pair blocks of ``K``."""
+    size = 2 * n
+    xx = xy = xz = yy = yz = zz = 0.0
+    for i in range(n):
+        x = alpha[3 * i]
+        y = alpha[3 * i + 1]
+        zc = alpha[3 * i + 2]
+        xx += x * x
+        xy += x * y
+        xz += x * zc
+        yy += y * y
+        yz += y * zc
+        zz += zc * zc
+        # Basis of the tangent plane without trigonometry (Duff et al. 2017).
+        sign = math.copysign(1.0, zc)
+        a = -1.0 / (sign + zc)
+        c = x * y * a
+        o = ROW * i
+        rows[o] = 1.0 + sign * x * x * a
+        rows[o + 1] = sign * c
+        rows[o + 2] = -sign * x
+        rows[o + 3] = c
+        rows[o + 4] = sign + y * y * a
+        rows[o + 5] = -y
+        for k in range(6, ROW):
+            rows[o + k] = 0.0
+        for k in range(2 * first[i], 2 * i):
+            K[size * 2 * i + k] = 0.0
+            K[size * (2 * i + 1) + k] = 0.0
+    M[0] = xx
+    M[1] = xy
+    M[2] = xz
+    M[3] = yy
+    M[4] = yz
+    M[5] = zz
+
+    for k in range(m):
+        i = pairs[2 * k]
+        j = pairs[2 * k + 1]  # j < i
+        oi = ROW * i
+        oj = ROW * j
+        gk = g[LIMITS * n + k]
+        zk = z[LIMITS * n + k]
+        stiff = zk / gk
+        primal = kappa_pair[k] / gk
+        aix, aiy, aiz = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        ajx, ajy, ajz = alpha[3 * j], alpha[3 * j + 1], alpha[3 * j + 2]
+        bi0, bi1, bi2 = rows[oi], rows[oi + 1], rows[oi + 2]
+        di0, di1, di2 = rows[oi + 3], rows[oi + 4], rows[oi + 5]
+        bj0, bj1, bj2 = rows[oj], rows[oj + 1], rows[oj + 2]
+        dj0, dj1, dj2 = rows[oj + 3], rows[oj + 4], rows[oj + 5]
+        c = aix * ajx + aiy * ajy + aiz * ajz
+        ui1 = bi0 * ajx + bi1 * ajy + bi2 * ajz
+        ui2 = di0 * ajx + di1 * ajy + di2 * ajz
+        uj1 = bj0 * aix + bj1 * aiy + bj2 * aiz
+        uj2 = dj0 * aix + dj1 * aiy + dj2 * aiz
+        rows[oi + 6] += zk * ui1
+        rows[oi + 7] += zk * ui2
+        rows[oj + 6] += zk * uj1
+        rows[oj + 7] += zk * uj2
+        rows[oi + 8] += primal * ui1
+        rows[oi + 9] += primal * ui2
+        rows[oj + 8] += primal * uj1
+        rows[oj + 9] += primal * uj2
+        rows[oi + 10] += stiff * ui1 * ui1 - zk * c
+        rows[oi + 11] += stiff * ui1 * ui2
+        rows[oi + 12] += stiff * ui2 * ui2 - zk * c
+        rows[oj + 10] += stiff * uj1 * uj1 - zk * c
+        rows[oj + 11] += stiff * uj1 * uj2
+        rows[oj + 12] += stiff * uj2 * uj2 - zk * c
+        scale = 1.0 / (T[i] * T[j])
+        top = size * 2 * i + 2 * j
+        low = top + size
+        K[top] = scale * (stiff * ui1 * uj1 + zk * (bi0 * bj0 + bi1 * bj1 + bi2 * bj2))
+        K[top + 1] = scale * (stiff * ui1 * uj2 + zk * (bi0 * dj0 + bi1 * dj1 + bi2 * dj2))
+        K[low] = scale * (stiff * ui2 * uj1 + zk * (di0 * bj0 + di1 * bj1 + di2 * bj2))
+        K[low + 1] = scale * (stiff * ui2 * uj2 + zk * (di0 * dj0 + di1 * dj1 + di2 * dj2))
+
+    for i in range(n):
+        d = DATA * i
+        o = ROW * i
+        at = LIMITS * i
+        t = T[i]
+        inv = 1.0 / t
+        x, y, zc = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        b0, b1, b2 = rows[o], rows[o + 1], rows[o + 2]
+        d0, d1, d2 = rows[o + 3], rows[o + 4], rows[o + 5]
+        px = xx * x + xy * y + xz * zc
+        py = xy * x + yy * y + yz * zc
+        pz = xz * x + yz * y + zz * zc
+        mb0 = xx * b0 + xy * b1 + xz * b2
+        mb1 = xy * b0 + yy * b1 + yz * b2
+        mb2 = xz * b0 + yz * b1 + zz * b2
+        md0 = xx * d0 + xy * d1 + xz * d2
+        md1 = xy * d0 + yy * d1 + yz * d2
+        md2 = xz * d0 + yz * d1 + zz * d2
+        ax, ay, az = data[d], data[d + 1], data[d + 2]
+        near = ax * x + ay * y + az * zc
+        e1 = ax * b0 + ay * b1 + az * b2
+        e2 = ax * d0 + ay * d1 + az * d2
+        # Functions of the direction: penalty, proximal term, rate, pairs.
+        hx, hy, hz = rho * data[d + HOME], rho * data[d + HOME + 1], rho * data[d + HOME + 2]
+        s1 = 2.0 * mu * (b0 * px + b1 * py + b2 * pz) - (hx * b0 + hy * b1 + hz * b2)
+        s2 = 2.0 * mu * (d0 * px + d1 * py + d2 * pz) - (hx * d0 + hy * d1 + hz * d2)
+        z3, g3 = z[at + 3], 1.0 / g[at + 3]
+        f3 = z3 * g3
+        k3 = kappa_rate * g3
+        gamma1 = rows[o + 6] + s1 - z3 * e1
+        gamma2 = rows[o + 7] + s2 - z3 * e2
+        base = hx * x + hy * y + hz * zc - 2.0 * mu * (px * x + py * y + pz * zc) + z3 * near
+        c11 = rows[o + 10] + 2.0 * mu * (b0 * mb0 + b1 * mb1 + b2 * mb2) + base + f3 * e1 * e1
+        c12 = rows[o + 11] + 2.0 * mu * (b0 * md0 + b1 * md1 + b2 * md2) + f3 * e1 * e2
+        c22 = rows[o + 12] + 2.0 * mu * (d0 * md0 + d1 * md1 + d2 * md2) + base + f3 * e2 * e2
+        squared = inv * inv
+        c11 *= squared
+        c12 *= squared
+        c22 *= squared
+        h1 = -gamma1 * squared
+        h2 = -gamma2 * squared
+        q1 = (rows[o + 8] + s1 - k3 * e1) * inv
+        q2 = (rows[o + 9] + s2 - k3 * e2) * inv
+        # Functions of the force.
+        omega = cost * data[d + OMEGA]
+        htt = omega
+        rt = omega * t
+        cos_cone = data[d + COS_CONE]
+        z0, z1, z2 = z[at], z[at + 1], z[at + 2]
+        g0, g1, g2 = 1.0 / g[at], 1.0 / g[at + 1], 1.0 / g[at + 2]
+        round_ = omega + (z0 - z1 + z2 * cos_cone) * inv
+        c11 += round_
+        c22 += round_
+        htt += z0 * g0
+        rt += kappa * g0
+        htt += z1 * g1
+        rt -= kappa * g1
+        v = -zc - cos_cone
+        f2 = z2 * g2
+        k2 = kappa * g2
+        htt += f2 * v * v
+        rt -= k2 * v
+        h1 -= f2 * v * b2
+        h2 -= f2 * v * d2
+        q1 += k2 * b2
+        q2 += k2 * d2
+        c11 += f2 * b2 * b2
+        c12 += f2 * b2 * d2
+        c22 += f2 * d2 * d2
+        if limits > 4:
+            fx = data[d + P] - t * x
+            fy = data[d + P + 1] - t * y
+            fz = data[d + P + 2] - t * zc
+            r = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz)
+            fx *= r
+            fy *= r
+            fz *= r
+            cos_tilt = data[d + COS_TILT]
+            ra = fx * x + fy * y + fz * zc
+            r1 = fx * b0 + fy * b1 + fz * b2
+            r2 = fx * d0 + fy * d1 + fz * d2
+            z4, z5 = z[at + 4], z[at + 5]
+            g4, g5 = 1.0 / g[at + 4], 1.0 / g[at + 5]
+            bend = (z4 + z5 * cos_tilt) * r
+            f4 = z4 * g4 - bend
+            k4 = kappa * g4
+            htt += bend + f4 * ra * ra
+            h1 += f4 * ra * r1
+            h2 += f4 * ra * r2
+            c11 += bend + f4 * r1 * r1
+            c12 += f4 * r1 * r2
+            c22 += bend + f4 * r2 * r2
+            rt -= k4 * ra
+            q1 -= k4 * r1
+            q2 -= k4 * r2
+            va = cos_tilt * ra - zc
+            v1 = cos_tilt * r1 - b2
+            v2 = cos_tilt * r2 - d2
+            f5 = z5 * g5
+            k5 = kappa * g5
+            htt += f5 * va * va
+            h1 += f5 * va * v1
+            h2 += f5 * va * v2
+            c11 += f5 * v1 * v1
+            c12 += f5 * v1 * v2
+            c22 += f5 * v2 * v2
+            rt -= k5 * va
+            q1 -= k5 * v1
+            q2 -= k5 * v2
+        rows[o + 10] = c11
+        rows[o + 11] = c12
+        rows[o + 12] = c22
+        rows[o + 13] = q1
+        rows[o + 14] = q2
+        rows[o + 15] = h1
+        rows[o + 16] = h2
+        rows[o + 17] = htt
+        rows[o + 18] = rt
+
+
+@inline
+def stationarity(n, alpha, rows, lam):  # type: ignore[no-untyped-def]
+    """Largest component over the cables of the Lagrangian's gradient (scaled force)."""
+    worst = 0.0
+    for i in range(n):
+        o = ROW * i
+        rt = rows[o + 18] + (
+            lam[0] * alpha[3 * i] + lam[1] * alpha[3 * i + 1] + lam[2] * alpha[3 * i + 2]
+        )
+        r1 = rows[o + 13] + lam[0] * rows[o] + lam[1] * rows[o + 1] + lam[2] * rows[o + 2]
+        r2 = rows[o + 14] + lam[0] * rows[o + 3] + lam[1] * rows[o + 4] + lam[2] * rows[o + 5]
+        worst = max(worst, rt * rt + r1 * r1 + r2 * r2)
+    return math.sqrt(worst)
+
+
+@inline
+def factor(n, shift, mu, T, alpha, rows, K, first, Y):  # type: ignore[no-untyped-def]
+    """Eliminate ``tau``; Cholesky of ``K + shift I`` in its envelope; ``Y = L^-1 [U^T, q]``.
+
+    False if ``K + shift I`` is not positive definite.
+    """
+    size = 2 * n
+    root = math.sqrt(2.0 * mu)
+    root_a = math.sqrt(2.0 * mu)
+    root_b = math.sqrt(6.0 * mu)
+    for i in range(n):
+        o = ROW * i
+        inv = 1.0 / T[i]
+        x, y, zc = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        b0, b1, b2 = rows[o], rows[o + 1], rows[o + 2]
+        d0, d1, d2 = rows[o + 3], rows[o + 4], rows[o + 5]
+        inverse = 1.0 / rows[o + 17]
+        h1, h2 = rows[o + 15] * inverse, rows[o + 16] * inverse
+        rt = rows[o + 18]
+        c00 = rows[o + 10] - h1 * rows[o + 15] + shift
+        c10 = rows[o + 11] - h1 * rows[o + 16]
+        c11 = rows[o + 12] - h2 * rows[o + 16] + shift
+        ra = root * inv
+        rb = root_a * inv
+        rc = root_b * inv
+        k0 = RHS * 2 * i
+        k1 = k0 + RHS
+        Y[k0] = ra * (x * b1 + y * b0)
+        Y[k0 + 1] = ra * (x * b2 + zc * b0)
+        Y[k0 + 2] = ra * (y * b2 + zc * b1)
+        Y[k0 + 3] = rb * (x * b0 - y * b1)
+        Y[k0 + 4] = rc * zc * b2
+        Y[k0 + 5] = b0 - x * h1
+        Y[k0 + 6] = b1 - y * h1
+        Y[k0 + 7] = b2 - zc * h1
+        Y[k0 + 8] = rows[o + 13] - h1 * rt
+        Y[k1] = ra * (x * d1 + y * d0)
+        Y[k1 + 1] = ra * (x * d2 + zc * d0)
+        Y[k1 + 2] = ra * (y * d2 + zc * d1)
+        Y[k1 + 3] = rb * (x * d0 - y * d1)
+        Y[k1 + 4] = rc * zc * d2
+        Y[k1 + 5] = d0 - x * h2
+        Y[k1 + 6] = d1 - y * h2
+        Y[k1 + 7] = d2 - zc * h2
+        Y[k1 + 8] = rows[o + 14] - h2 * rt
+        top = size * 2 * i
+        low = top + size
+        for j in range(first[i], i):
+            tj = size * 2 * j
+            lj = tj + size
+            s00, s01 = K[top + 2 * j], K[top + 2 * j + 1]
+            s10, s11 = K[low + 2 * j], K[low + 2 * j + 1]
+            for k in range(2 * max(first[i], first[j]), 2 * j):
+                x0, x1 = K[top + k], K[low + k]
+                y0, y1 = K[tj + k], K[lj + k]
+                s00 -= x0 * y0
+                s01 -= x0 * y1
+                s10 -= x1 * y0
+                s11 -= x1 * y1
+            i0 = K[tj + 2 * j]
+            l10 = K[lj + 2 * j]
+            i1 = K[lj + 2 * j + 1]
+            s00 *= i0
+            s10 *= i0
+            s01 = (s01 - s00 * l10) * i1
+            s11 = (s11 - s10 * l10) * i1
+            K[top + 2 * j] = s00
+            K[top + 2 * j + 1] = s01
+            K[low + 2 * j] = s10
+            K[low + 2 * j + 1] = s11
+            c00 -= s00 * s00 + s01 * s01
+            c10 -= s00 * s10 + s01 * s11
+            c11 -= s10 * s10 + s11 * s11
+            q0 = RHS * 2 * j
+            q1 = q0 + RHS
+            for k in range(RHS):
+                Y[k0 + k] -= s00 * Y[q0 + k] + s01 * Y[q1 + k]
+                Y[k1 + k] -= s10 * Y[q0 + k] + s11 * Y[q1 + k]
+        if not c00 > 1e-10:
+            return False
+        i0 = 1.0 / math.sqrt(c00)
+        l10 = c10 * i0
+        c11 -= l10 * l10
+        if not c11 > 1e-10:
+            return False
+        i1 = 1.0 / math.sqrt(c11)
+        K[top + 2 * i] = i0
+        K[low + 2 * i] = l10
+        K[low + 2 * i + 1] = i1
+        for k in range(RHS):
+            Y[k0 + k] *= i0
+            Y[k1 + k] = (Y[k1 + k] - l10 * Y[k0 + k]) * i1
+    return True
+
+
+@inline
+def reduced_system(n, alpha, rows, Y, rx, ry, rz, S):  # type: ignore[no-untyped-def]
+    """Lower triangle and right-hand side (row 8) of the 8x8 system, ``(rx, ry, rz) = sum w + F``."""
+    for k in range(SYSTEM):
+        S[k] = 0.0
+    for k in range(5):
+        S[9 * k] = 1.0
+    S[69] = rx
+    S[70] = ry
+    S[71] = rz
+    for i in range(n):
+        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        inverse = 1.0 / rows[ROW * i + 17]
+        S[45] += x * x * inverse
+        S[53] += y * x * inverse
+        S[54] += y * y * inverse
+        S[61] += z * x * inverse
+        S[62] += z * y * inverse
+        S[63] += z * z * inverse
+        part = rows[ROW * i + 18] * inverse
+        S[69] -= part * x
+        S[70] -= part * y
+        S[71] -= part * z
+        k0 = RHS * 2 * i
+        for r in range(2):
+            o = k0 + RHS * r
+            for k in range(8):
+                value = Y[o + k]
+                S[64 + k] -= value * Y[o + 8]
+                for c in range(k + 1):
+                    S[8 * k + c] += value * Y[o + c]
+
+
+@inline
+def solve_2x2_disc(a, b, c, x, y, radius):  # type: ignore[no-untyped-def]
+    """Maximise ``r.l - 1/2 l^T A l`` over ``|l| <= radius``, ``A = [[a, b], [b, c]]`` positive definite.
+
+    ``(A + nu I) l = r`` with the smallest ``nu >= 0`` that keeps ``|l| <= radius`` (secular equation).
+    """
+    nu = 0.0
+    lx = ly = 0.0
+    for _ in range(50):
+        p = a + nu
+        q = c + nu
+        det = 1.0 / (p * q - b * b)
+        lx = (q * x - b * y) * det
+        ly = (p * y - b * x) * det
+        norm = math.sqrt(lx * lx + ly * ly)
+        if norm <= radius * (1.0 + 1e-12):
+            break
+        mx = (q * lx - b * ly) * det
+        my = (p * ly - b * lx) * det
+        nu += (norm / radius - 1.0) * norm * norm / (lx * mx + ly * my)
+    return lx, ly
+
+
+@inline
+def multiplier(S, bound_h, bound_v):  # type: ignore[no-untyped-def]
+    """Solve the 8x8 system with the multiplier of the force inside its bounds; into ``S[64:]``.
+
+    Returns whether the bound is active (the force gives way).
+    """
+    for k in range(5):
+        inverse = 1.0 / S[9 * k]
+        S[9 * k] = inverse
+        for r in range(k + 1, 9):
+            f = S[8 * r + k] * inverse
+            for c in range(k + 1, min(r + 1, 8)):
+                S[8 * r + c] -= f * S[8 * c + k]
+    a, b, c = S[45], S[53], S[54]
+    d, e, f = S[61], S[62], S[63]
+    x, y, z = S[69], S[70], S[71]
+    # Unbounded vertical part first: Schur complement on the horizontal part.
+    inverse = 1.0 / f
+    lx, ly = solve_2x2_disc(
+        a - d * d * inverse,
+        b - d * e * inverse,
+        c - e * e * inverse,
+        x - d * z * inverse,
+        y - e * z * inverse,
+        bound_h,
+    )
+    lz = (z - d * lx - e * ly) * inverse
+    if abs(lz) > bound_v:
+        lz = math.copysign(bound_v, lz)
+        lx, ly = solve_2x2_disc(a, b, c, x - d * lz, y - e * lz, bound_h)
+    active = lx * lx + ly * ly >= bound_h * bound_h * (1.0 - 1e-9) or abs(lz) >= bound_v
+    S[69] = lx
+    S[70] = ly
+    S[71] = lz
+    for k in range(4, -1, -1):
+        value = S[64 + k]
+        for m in range(k + 1, 8):
+            value -= S[8 * m + k] * S[64 + m]
+        S[64 + k] = value * S[9 * k]
+    return active
+
+
+@inline
+def back_substitute(n, alpha, rows, K, first, Y, S, dw):  # type: ignore[no-untyped-def]
+    """``dw`` of every cable from the solution in ``S[64:]``; the largest squared ``|dw|`` is returned."""
+    size = 2 * n
+    for r in range(2 * n):
+        o = RHS * r
+        value = Y[o + 8]
+        for k in range(8):
+            value += Y[o + k] * S[64 + k]
+        Y[o + 8] = -value
+    lx, ly, lz = S[69], S[70], S[71]
+    worst = 0.0
+    for i in range(n - 1, -1, -1):
+        top = size * 2 * i
+        low = top + size
+        k0 = RHS * 2 * i + 8
+        k1 = k0 + RHS
+        eta2 = Y[k1] * K[low + 2 * i + 1]
+        eta1 = (Y[k0] - K[low + 2 * i] * eta2) * K[top + 2 * i]
+        for j in range(first[i], i):
+            Y[RHS * 2 * j + 8] -= K[top + 2 * j] * eta1 + K[low + 2 * j] * eta2
+            Y[RHS * (2 * j + 1) + 8] -= K[top + 2 * j + 1] * eta1 + K[low + 2 * j + 1] * eta2
+        o = ROW * i
+        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        tau = -(rows[o + 18] + lx * x + ly * y + lz * z)
+        tau = (tau - rows[o + 15] * eta1 - rows[o + 16] * eta2) / rows[o + 17]
+        dx = tau * x + rows[o] * eta1 + rows[o + 3] * eta2
+        dy = tau * y + rows[o + 1] * eta1 + rows[o + 4] * eta2
+        dz = tau * z + rows[o + 2] * eta1 + rows[o + 5] * eta2
+        dw[3 * i] = dx
+        dw[3 * i + 1] = dy
+        dw[3 * i + 2] = dz
+        worst = max(worst, dx * dx + dy * dy + dz * dz)
+    return worst

@@ -1,0 +1,141 @@
+"""Lead a configuration that breaks a limit back: a rate-limited repulsion on the sphere.
+
+Before the optimisation of a cycle, cables that are too close are pushed apart along their great circles
+and cables outside the cone are turned towards the vertical, all within a part of what the rate
+limit allows. A move is taken only if it leaves no broken limit worse and breaks no other; the limits
+of this cycle are then set between where the configuration was and where it is now, and the proximal
+term holds what was gained. Cables move one after the other, so that one that is stuck does not
+hold up the others.
+
+Coincident cables have no direction to part in: the golden angle gives each its own.
+
+This file imports only the compiler front end.
+"""
+
+from __future__ import annotations
+
+import math
+
+from colift.kernel.jit import inline
+
+BUFFER = 0.02
+"""Aim this much inside the limits, rad."""
+SHARE = 0.7
+"""Part of the rate limit that recovery may use; the optimisation has the rest."""
+SWEEPS = 12
+"""Sweeps of the repulsion in one cycle."""
+ROOM = 1e-7
+"""How much worse (cosine) a broken limit may get in one cycle where nothing gives it way."""
+FIRM = 10.0
+"""Largest push between two cables that are too close, in shares of the load."""
+SURE = 1e-12
+"""The iteration can start from this margin of a limit on."""
+ROUNDING = 1e-12
+"""A limit that is missed by no more than this is kept."""
+
+
+@inline
+def is_broken(n, cos_angle, cos_cone, margin, alpha):  # type: ignore[no-untyped-def]
+    """Whether any pair or any cable's place in the cone has no more than a margin (cosine)."""
+    for i in range(n):
+        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        if not -z - cos_cone > margin:
+            return True
+        for j in range(i):
+            c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
+            if not cos_angle - c > margin:
+                return True
+    return False
+
+
+@inline
+def push_of(n, i, aim, rim, alpha):  # type: ignore[no-untyped-def]
+    """Tangential push on cable i, rad: half of every deficit of angle, all of that from the cone."""
+    x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+    cos_aim = math.cos(aim)
+    px = py = pz = 0.0
+    for j in range(n):
+        if j == i:
+            continue
+        c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
+        if c <= cos_aim:
+            continue
+        dx = x - alpha[3 * j]
+        dy = y - alpha[3 * j + 1]
+        dz = z - alpha[3 * j + 2]
+        norm = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if norm < 1e-4:
+            angle = 2.399963229728653 * i
+            dx, dy, dz = math.cos(angle), math.sin(angle), 0.5 * math.cos(1.7 * angle)
+            norm = math.sqrt(dx * dx + dy * dy + dz * dz)
+        push = 0.5 * (aim - math.acos(min(c, 1.0))) / norm
+        px += push * dx
+        py += push * dy
+        pz += push * dz
+    if -z < math.cos(rim):
+        # Along the meridian to the vertical; straight up has no meridian of its own.
+        push = math.acos(max(-z, -1.0)) - rim
+        h = math.sqrt(x * x + y * y)
+        ex, ey = (x / h, y / h) if h > 1e-6 else (math.cos(2.4 * i), math.sin(2.4 * i))
+        px += push * z * ex
+        py += push * z * ey
+        pz -= push * h
+    return px, py, pz
+
+
+@inline
+def is_no_worse(n, i, x, y, z, cos_angle, cos_cone, alpha):  # type: ignore[no-untyped-def]
+    """Whether cable i may move to (x, y, z): no kept limit breaks, no broken one gets worse."""
+    u, v, w = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+    if -z - cos_cone < min(1e-6, -w - cos_cone):
+        return False
+    for j in range(n):
+        if j != i:
+            new = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
+            old = u * alpha[3 * j] + v * alpha[3 * j + 1] + w * alpha[3 * j + 2]
+            if cos_angle - new < min(1e-6, cos_angle - old):
+                return False
+    return True
+
+
+@inline
+def lead_back(n, min_angle, cone, delta, start, alpha):  # type: ignore[no-untyped-def]
+    """Move ``alpha`` from ``start`` towards the limits, cable by cable, each within its rate."""
+    cos_angle, cos_cone = math.cos(min_angle), math.cos(cone)
+    aim = min_angle + BUFFER
+    rim = max(cone - BUFFER, 0.5 * cone)
+    chord = 2.0 * math.sin(0.5 * SHARE * delta)
+    for _ in range(SWEEPS):
+        moved = False
+        for i in range(n):
+            px, py, pz = push_of(n, i, aim, rim, alpha)
+            size = math.sqrt(px * px + py * py + pz * pz)
+            if size < 1e-9:
+                continue
+            scale = min(1.0, chord / size)
+            for _ in range(4):
+                x = alpha[3 * i] + scale * px
+                y = alpha[3 * i + 1] + scale * py
+                z = alpha[3 * i + 2] + scale * pz
+                norm = 1.0 / math.sqrt(x * x + y * y + z * z)
+                dx = x * norm - start[3 * i]
+                dy = y * norm - start[3 * i + 1]
+                dz = z * norm - start[3 * i + 2]
+                length = math.sqrt(dx * dx + dy * dy + dz * dz)
+                part = chord / length if length > chord else 1.0
+                x = start[3 * i] + part * dx
+                y = start[3 * i + 1] + part * dy
+                z = start[3 * i + 2] + part * dz
+                norm = 1.0 / math.sqrt(x * x + y * y + z * z)
+                x *= norm
+                y *= norm
+                z *= norm
+                if is_no_worse(n, i, x, y, z, cos_angle, cos_cone, alpha):
+                    alpha[3 * i] = x
+                    alpha[3 * i + 1] = y
+                    alpha[3 * i + 2] = z
+                    moved = True
+                    break
+                scale *= 0.3
+        if not moved:
+            break

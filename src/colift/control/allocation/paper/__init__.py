@@ -1,0 +1,1 @@
+"""The paper's problem: its Newton steps and its optimum."""

@@ -1,0 +1,547 @@
+"""The safe allocator: the paper's cost under hard limits on cables, pairs and drones."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, TypedDict, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from colift.control.allocation.base import (
+    INFO_ACTIVE,
+    INFO_BALANCE,
+    INFO_GAP,
+    INFO_OBJECTIVE,
+    INFO_RESIDUAL,
+    SIGNATURE,
+    Allocator,
+    AllocatorPart,
+    Motors,
+    Status,
+)
+from colift.control.allocation.common.oracle import paper_objective
+from colift.control.allocation.limits import cycle, newton
+from colift.control.allocation.limits import feasibility as feasible
+from colift.control.allocation.paper import newton as paper
+from colift.errors import Problem, SettingError
+from colift.kernel.jit import kernel
+from colift.part import Vector
+from colift.team import Team
+from colift.team.geometry import Array, pairwise_angles, ring, widest_gap
+
+_CONVERGED = int(Status.CONVERGED)
+_ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
+_INVALID_FORCE = int(Status.INVALID_FORCE)
+_FORCE_REDUCED = int(Status.FORCE_REDUCED)
+_RECOVERING = int(Status.RECOVERING)
+"""Where ``info`` has a sixth place: which kinds of limits push, one bit each in the order of
+:mod:`colift.control.allocation.limits.newton`; 64 stands for the pairs."""
+
+
+@kernel(SIGNATURE)
+def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    force, acceleration = sees.force, sees.reference[2]
+    tensions, directions = writes.desired_tensions, writes.desired_directions
+    info = writes.allocator_info
+    n = tensions.shape[0]
+    most = n * (n - 1) // 2
+    count = newton.LIMITS * n + most
+    o = 0
+    data = memory[o : o + newton.DATA * n]
+    o += newton.DATA * n
+    T = memory[o : o + n]
+    o += n
+    alpha = memory[o : o + 3 * n]
+    o += 3 * n
+    start = memory[o : o + 3 * n]
+    o += 3 * n
+    w = memory[o : o + 3 * n]
+    o += 3 * n
+    dw = memory[o : o + 3 * n]
+    o += 3 * n
+    w_new = memory[o : o + 3 * n]
+    o += 3 * n
+    g = memory[o : o + count]
+    o += count
+    g_new = memory[o : o + count]
+    o += count
+    z = memory[o : o + count]
+    o += count
+    kappa_pair = memory[o : o + most]
+    o += most
+    cos_max = memory[o : o + most]
+    o += most
+    rows = memory[o : o + newton.ROW * n]
+    o += newton.ROW * n
+    K = memory[o : o + 4 * n * n]
+    o += 4 * n * n
+    Y = memory[o : o + 2 * n * newton.RHS]
+    o += 2 * n * newton.RHS
+    S = memory[o : o + newton.SYSTEM]
+    o += newton.SYSTEM
+    lam = memory[o : o + 3]
+    M = memory[o + 3 : o + 9]
+    facing = memory[o + 9 : o + 12]
+    yielded = memory[o + 12 : o + 13]
+    asked = memory[o + 13 : o + 16]
+    o += 16
+    integers = memory[o : o + 2 * n + 2 * most].view(np.int64)
+    order = integers[:n]
+    first = integers[n : 2 * n]
+    pairs = integers[2 * n :]
+
+    for k in range(info.shape[0]):
+        info[k] = 0.0
+    fx, fy, fz = force[0], force[1], force[2]
+    if not math.isfinite(fx + fy + fz):
+        info[INFO_RESIDUAL] = math.nan
+        info[INFO_GAP] = math.nan
+        info[INFO_OBJECTIVE] = math.nan
+        info[INFO_BALANCE] = math.nan
+        return _INVALID_FORCE
+    sigma = params[cycle.SIGMA]
+    unit = 1.0 / sigma
+    # More than all cables can give changes nothing but the numbers' size.
+    most_force = 2.0 * params[cycle.TOTAL]
+    fx = min(max(fx, -most_force), most_force) * unit
+    fy = min(max(fy, -most_force), most_force) * unit
+    fz = min(max(fz, -most_force), most_force) * unit
+    W = math.sqrt(fx * fx + fy * fy + fz * fz)
+    mu = params[cycle.MU] * unit * unit
+    if params[cycle.MU_SCALED] != 0.0:
+        mu *= (W * sigma / params[cycle.MU_FORCE]) ** 2
+    period = dt if dt > 1e-6 else 1e-6
+    delta = min(params[cycle.MAX_RATE] * period, cycle.MAX_TURN)
+    rho = params[cycle.SETTLING] / period
+
+    cycle.sort_cables(n, directions, order)
+    relaxed = cycle.set_up(
+        n,
+        order,
+        W,
+        unit,
+        delta,
+        acceleration,
+        tensions,
+        directions,
+        params,
+        data,
+        T,
+        start,
+        alpha,
+        w,
+    )
+    if W > 1e-6 and not relaxed:
+        follow = period / (params[cycle.TURNING] + period)
+        cycle.turn_home(n, fx, fy, fz, W, follow, cycle.TURN * delta, data, facing, w_new, dw)
+    m = cycle.near_pairs(
+        n,
+        params[cycle.MIN_ANGLE],
+        max(params[cycle.REACH], 2.0 * delta),
+        params[cycle.KAPPA_PAIR],
+        start,
+        alpha,
+        pairs,
+        first,
+        kappa_pair,
+        cos_max,
+    )
+    heavy = max(1.0, abs(fz) / n)
+    leaning = 0.0
+    if yielded[0] > 0.0:
+        leaning = cycle.leaning_now(fx, fy, fz, W, delta, yielded, asked)
+    outcome = cycle.iterate(
+        n,
+        int(params[cycle.LIMITS]),
+        m,
+        fx,
+        fy,
+        fz,
+        mu,
+        rho,
+        params[cycle.KAPPA],
+        0.5 * params[cycle.KAPPA_RATE] * max(rho, 1.0) * delta * delta,
+        params[cycle.KAPPA_PAIR],
+        params[cycle.PRICE] * heavy,
+        yielded[0] != 0.0,
+        leaning,
+        params[cycle.TOLERANCE],
+        int(params[cycle.ITERATIONS]),
+        pairs,
+        first,
+        kappa_pair,
+        cos_max,
+        data,
+        T,
+        alpha,
+        w,
+        dw,
+        w_new,
+        g,
+        g_new,
+        z,
+        rows,
+        K,
+        Y,
+        S,
+        lam,
+        M,
+        info,
+    )
+    info[INFO_ACTIVE] = cycle.active_limits(n, int(params[cycle.LIMITS]), m, z)
+    squares = M[0] * M[0] + M[3] * M[3] + M[5] * M[5]
+    squares += 2.0 * (M[1] * M[1] + M[2] * M[2] + M[4] * M[4])
+    J = 0.5 * mu * (squares - n)
+    rx, ry, rz = force[0], force[1], force[2]
+    for i in range(n):
+        at = order[i]
+        J += 0.5 * data[newton.DATA * i + newton.OMEGA] * T[i] * T[i]
+        tensions[at] = T[i] * sigma
+        for k in range(3):
+            directions[at, k] = alpha[3 * i + k]
+        rx += tensions[at] * directions[at, 0]
+        ry += tensions[at] * directions[at, 1]
+        rz += tensions[at] * directions[at, 2]
+    balance = math.sqrt(rx * rx + ry * ry + rz * rz)
+    info[INFO_BALANCE] = balance
+    info[INFO_OBJECTIVE] = J * sigma * sigma
+    info[INFO_GAP] = math.nan
+    if W > 1e-6 and mu > 0.0 and params[cycle.EQUAL] != 0.0:
+        info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
+    reduced = balance > 1e-8 * max(1.0, sigma)
+    yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
+    if relaxed and cycle.breaks_a_limit(n, order, unit, params, data, T, alpha):
+        return _RECOVERING
+    if reduced:
+        return _FORCE_REDUCED
+    if outcome == cycle.CONVERGED:
+        return _CONVERGED
+    return _ITERATION_LIMIT
+
+
+Degrees = Annotated[float, Field(gt=0.0, lt=90.0)]
+Force = Annotated[float, Field(gt=0.0, le=1e6)]
+
+RATE_BARRIER = 1.0
+"""Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
+GIVE_WAY = 20.0
+"""Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
+RECOVERY = 5.0
+"""Time in which a start that breaks a limit must be led back, s."""
+
+
+class Safe(AllocatorPart):
+    """The paper's cost under hard limits on cables, pairs of cables and drones.
+
+    The limits hold in every answer. Where they do not allow the whole force, the force gives way, its
+    horizontal part first. Which member of the paper's flat family of optima is chosen, and kept, is
+    decided by the barrier of the pairs (``spread``) and a proximal term (``settling``), whose centre turns with
+    the force (``turning``).
+    """
+
+    kernel = _allocate
+    spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
+    per_drone = ("tension_min", "tension_max", "max_thrust", "weights")
+
+    mu: Annotated[float, Field(ge=0.0)] = 0.15
+    """Weight of the alignment penalty, N^2."""
+    mu_scaling: Literal["absolute", "weight"] = "absolute"
+    """``weight``: mu grows with the square of the force, so that a heavier load does not draw the
+    cables together; ``mu`` is meant for ``mu_force``."""
+    mu_force: Force = 2.20725
+    """Force for which ``mu`` is meant when it is scaled, N (default: weight of the paper's load)."""
+    min_angle_deg: Annotated[float, Field(gt=0.0, lt=150.0)] = 30.0
+    """Least angle between any two cables, degrees."""
+    tension_min: Force | list[Force] = 0.05
+    """Least tension, N; one value, or one per cable."""
+    tension_max: Force | list[Force] = 5.0
+    """Largest tension, N; one value, or one per cable."""
+    max_cone_deg: Degrees = 75.0
+    """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
+    max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 6.0
+    """Fastest turn of a cable's direction, rad/s."""
+    max_thrust: Force | list[Force] | None = None
+    """Largest thrust of a drone, N; none: not limited."""
+    max_tilt_deg: Degrees | None = None
+    """Largest angle between a drone's thrust and the vertical, degrees; none: not limited."""
+    weights: Annotated[float, Field(gt=0.0)] | list[Annotated[float, Field(gt=0.0)]] = 1.0
+    """Weight of each cable's squared tension, such as the inverse of a battery's charge; only ratios count."""
+    settling: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
+    """Time with which directions settle at the optimum, s; tensions follow at once."""
+    turning: Annotated[float, Field(ge=0.0, le=10.0)] = 0.04
+    """Time with which the formation as a whole turns with the force, s."""
+    spread: Annotated[float, Field(ge=1e-6, le=1.0)] = 1e-2
+    """Barrier between near cables, in squared shares of the load; more spreads them wider."""
+    barrier: Annotated[float, Field(ge=1e-7, le=0.1)] = 1e-3
+    """Barrier of all other limits, in squared shares of the load. Approach very small ones in steps."""
+    tolerance: Annotated[float, Field(ge=1e-10, le=1e-3)] = 1e-6
+    """KKT residual, in shares of the load, at which the iteration stops."""
+    max_iterations: Annotated[int, Field(ge=2, le=200)] = 36
+    """Most interior-point steps in one call."""
+
+    @model_validator(mode="after")
+    def _ranges(self) -> Safe:
+        low = np.atleast_1d(np.asarray(self.tension_min, dtype=float))
+        high = np.atleast_1d(np.asarray(self.tension_max, dtype=float))
+        comparable = 1 in (low.size, high.size) or low.size == high.size
+        if comparable and np.any(1.2 * low > high):
+            raise ValueError(
+                f"tension_min = {self.tension_min} conflicts with tension_max = {self.tension_max}: "
+                "each cable needs tension_max of at least 1.2 tension_min"
+            )
+        return self
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        return self.wrong_lengths(team.n)
+
+    def conflicts(self, team: Team) -> list[tuple[str, str]]:
+        problems = []
+        if self.max_thrust is not None:
+            own = team.masses * team.gravity
+            weak = np.flatnonzero(0.8 * np.broadcast_to(self.max_thrust, team.n) < own)
+            if weak.size:
+                i = int(weak[0])
+                problems.append(
+                    (
+                        "max_thrust",
+                        f"max_thrust = {self.max_thrust} conflicts with drones.mass: drone {i} alone "
+                        f"weighs {own[i]:.4g} N and needs a quarter more to fly",
+                    )
+                )
+        return problems + feasible.conflicts_of(team, self)
+
+    def cannot_hold(self, team: Team, thrusts: Vector, directions: Vector) -> list[str]:
+        return feasible.cannot_hold(team, self, thrusts, directions)
+
+    def binding(self, team: Team, actuation: Motors) -> list[str]:
+        return [str(each) for each in feasible.binding_limits(team, self, actuation)]
+
+    def thrust_limits(self, team: Team) -> Vector:
+        """Largest thrust of each drone (n,) as far as the allocator is told, N; inf: not limited."""
+        most = math.inf if self.max_thrust is None else self.max_thrust
+        return np.array(np.broadcast_to(np.asarray(most, dtype=float), team.n))
+
+    def cannot_start(self, team: Team, directions: Array) -> str:
+        if self._keeps_limits(directions):
+            return ""
+        allocator = SafeAllocator.unchecked(team, self)
+        allocator.reset(directions)
+        for _ in range(round(RECOVERY / allocator.dt)):
+            answer = allocator.allocate([0.0, 0.0, team.load_mass * team.gravity])
+            if answer.status is not Status.RECOVERING:
+                return ""
+        polar = np.arccos(np.clip(-answer.directions[:, 2], -1.0, 1.0))
+        apart, widest = (
+            f"{math.degrees(angle):.1f} degrees"
+            for angle in (
+                np.min(pairwise_angles(answer.directions), initial=math.pi),
+                feasible.widest_angle(team.n, math.radians(self.max_cone_deg)),
+            )
+        )
+        return (
+            f"breaks a limit and cannot be led back: after {RECOVERY:g} s of hover the {team.n} cables would "
+            f"be {apart} apart and up to {math.degrees(polar.max()):.1f} degrees from the vertical "
+            f"(allocation.min_angle_deg = {self.min_angle_deg:g}, max_cone_deg = {self.max_cone_deg:g}; "
+            f"the widest formation in that cone has {widest}): start within the limits, with "
+            "start.directions where one ring is too narrow, or ask for less"
+        )
+
+    def _keeps_limits(self, directions: Array) -> bool:
+        """Whether every pair and every cable's place in the cone is as asked."""
+        least, cone = math.radians(self.min_angle_deg), math.radians(self.max_cone_deg)
+        pairs = pairwise_angles(directions)
+        return bool(np.all(pairs > least) and np.all(-directions[:, 2] > math.cos(cone)))
+
+    def tension_caps(self, n: int) -> Vector:
+        """Largest tension of each cable (n,), N."""
+        return np.array(np.broadcast_to(np.asarray(self.tension_max, dtype=float), n))
+
+    def tension_floors(self, n: int) -> Vector:
+        """Least tension of each cable (n,), N."""
+        return np.array(np.broadcast_to(np.asarray(self.tension_min, dtype=float), n))
+
+    def params(self, team: Team) -> Vector:
+        n = team.n
+        limited = self.max_thrust is not None or self.max_tilt_deg is not None
+        head = np.zeros(cycle.HEAD)
+        head[cycle.MU] = self.mu
+        head[cycle.MU_SCALED] = self.mu_scaling == "weight"
+        head[cycle.MU_FORCE] = self.mu_force
+        head[cycle.SIGMA] = max(team.load_mass * max(team.gravity, 1e-3) / n, 1e-6)
+        head[cycle.KAPPA] = self.barrier
+        head[cycle.KAPPA_RATE] = RATE_BARRIER
+        head[cycle.KAPPA_PAIR] = self.spread
+        head[cycle.MIN_ANGLE] = math.radians(self.min_angle_deg)
+        head[cycle.REACH] = self._reach(n)
+        head[cycle.MAX_RATE] = self.max_rate
+        head[cycle.SETTLING] = self.settling
+        head[cycle.TURNING] = self.turning
+        weights = self._relative_weights(n)
+        head[cycle.PRICE] = GIVE_WAY * float(weights.max())
+        head[cycle.TOLERANCE] = self.tolerance
+        head[cycle.ITERATIONS] = self.max_iterations
+        head[cycle.LIMITS] = newton.LIMITS if limited else newton.TILT - 1
+        head[cycle.GRAVITY] = team.gravity
+        head[cycle.CONE] = math.radians(self.max_cone_deg)
+        head[cycle.TILT] = math.radians(self.max_tilt_deg or 89.0)
+        head[cycle.TOTAL] = float(np.sum(self.tension_caps(n)))
+        head[cycle.EQUAL] = bool(np.all(weights == 1.0))
+        cables = np.empty((n, cycle.PER_CABLE))
+        cables[:, 0] = weights
+        cables[:, 1] = self.tension_floors(n)
+        cables[:, 2] = self.tension_caps(n)
+        cables[:, 3] = team.masses
+        cables[:, 4] = 1e6 if self.max_thrust is None else self.max_thrust
+        return np.concatenate([head, cables.ravel()])
+
+    def _relative_weights(self, n: int) -> Vector:
+        """Weight of each cable (n,) relative to their mean; ones, exactly, where all are the same."""
+        weights = np.array(np.broadcast_to(np.asarray(self.weights, dtype=float), n))
+        weights /= weights.max()
+        return np.asarray(weights / weights.mean())
+
+    def _reach(self, n: int) -> float:
+        """Distance beyond the least angle at which a pair is seen, rad: about the second neighbours."""
+        cone, least = math.radians(self.max_cone_deg), math.radians(self.min_angle_deg)
+        spacing = math.sqrt(1.15 * 2.0 * math.pi * (1.0 - math.cos(cone)) / n)
+        return min(max(1.8 * spacing - least, 0.3 * least), math.radians(60.0))
+
+    def memory(self, team: Team) -> Vector:
+        n = team.n
+        pairs = n * (n - 1) // 2
+        limits = newton.LIMITS * n + pairs
+        cables = newton.DATA + 16 + newton.ROW + 2 * newton.RHS + 2  # 2: order, first
+        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 16)
+
+    def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
+        mu = self.mu
+        if self.mu_scaling == "weight":
+            mu *= float(np.sum((tensions @ directions) ** 2)) / self.mu_force**2
+        weights = self._relative_weights(len(tensions))
+        return paper_objective(mu, np.sqrt(weights) * tensions, directions)
+
+
+class _Further(TypedDict, total=False):
+    mu_scaling: Literal["absolute", "weight"]
+    mu_force: float
+    max_rate: float
+    max_thrust: float | list[float] | None
+    max_tilt_deg: float | None
+    weights: float | list[float]
+    settling: float
+    turning: float
+    spread: float
+    barrier: float
+    tolerance: float
+    max_iterations: int
+
+
+class SafeSettings(_Further, total=False):
+    """The settings of :class:`Safe` as keywords, so that a type checker knows their names."""
+
+    mu: float
+    min_angle_deg: float
+    tension_min: float | list[float]
+    tension_max: float | list[float]
+    max_cone_deg: float
+
+
+class SafeAllocator(Allocator):
+    """The safe allocator, called by hand; see :class:`Safe` for the settings.
+
+    Raises
+    ------
+    SettingError
+        For an unknown setting, a value out of range, or limits that cannot hold together, by name.
+
+    Examples
+    --------
+    >>> allocator = SafeAllocator(n=4, mu=0.15, min_angle_deg=30, tension_min=0.05)
+    >>> allocator.allocate([0.0, 0.0, 2.2]).status.ok
+    True
+
+    """
+
+    part: Safe
+
+    def __init__(
+        self,
+        n: int | Team = 4,
+        mu: float = 0.15,
+        min_angle_deg: float = 30.0,
+        tension_min: float | list[float] = 0.05,
+        tension_max: float | list[float] = 5.0,
+        max_cone_deg: float = 75.0,
+        *,
+        cone_deg: float = 35.0,
+        dt: float = 0.01,
+        **settings: Unpack[_Further],
+    ) -> None:
+        part = Safe(
+            mu=mu,
+            min_angle_deg=min_angle_deg,
+            tension_min=tension_min,
+            tension_max=tension_max,
+            max_cone_deg=max_cone_deg,
+            **settings,
+        )
+        team = n if isinstance(n, Team) else Team.uniform(n)
+        if problems := part.check(team) or part.conflicts(team):
+            raise SettingError([Problem(name, "", message) for name, message in problems])
+        super().__init__(part, team, cone_deg=cone_deg, dt=dt)
+
+    def update(self, **settings: Unpack[SafeSettings]) -> None:  # type: ignore[override]
+        super().update(**settings)
+
+    @classmethod
+    def unchecked(cls, team: Team, part: Safe) -> SafeAllocator:
+        """An allocator for limits that may conflict: the least violation is what is wanted."""
+        allocator = cls.__new__(cls)
+        Allocator.__init__(allocator, part, team)
+        return allocator
+
+    @property
+    def mu(self) -> float:
+        """Weight of the alignment penalty, N^2; may be changed between two calls."""
+        return self.part.mu
+
+    @mu.setter
+    def mu(self, value: float) -> None:
+        self.update(mu=value)
+
+    def reset(self, directions: ArrayLike | None = None, tensions: ArrayLike | None = None) -> None:
+        """Forget the last answer and start from the given one, or from a formation within the limits.
+
+        The default is the ring of ``cone_deg``, or a wider formation where the ring is too narrow.
+        """
+        if directions is None:
+            directions = self._default()
+        super().reset(directions, tensions)
+
+    def _default(self) -> Vector:
+        cone, most = self._cone, math.radians(self.part.max_cone_deg)
+        enough = math.radians(self.part.min_angle_deg + 1.0)
+        default = ring(self.n, min(cone, 0.95 * most))
+        if self.n == 1 or float(pairwise_angles(default).min()) >= enough:
+            return default
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            candidate, angle = feasible.widest_formation(
+                self.n, cone + share * (0.98 * most - cone), enough=enough
+            )
+            if angle >= enough:
+                break
+        return candidate
+
+    def _gap(self) -> Vector:
+        """In the start's cone if that has room, else in a wider one."""
+        most = 0.98 * math.radians(self.part.max_cone_deg)
+        enough = math.cos(math.radians(self.part.min_angle_deg + 1.0))
+        narrow = min(self._cone, most)
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            cable = widest_gap(self._directions, narrow + share * (most - narrow))
+            if float(np.max(self._directions @ cable)) <= enough:
+                break
+        return cable

@@ -1,0 +1,22 @@
+"""The contract of the load-control layer: from the load's tracking error to a wanted force."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from colift.kernel.ports import PORTS
+from colift.part import Part
+
+SIGNATURE = PORTS["load_control"].signature
+"""Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
+
+Called at the layer's own period, ``now.dt``.
+"""
+
+
+class LoadControlPart(Part):
+    """Base of all load controllers."""
+
+    layer: ClassVar[str] = "load_control"
+    senses: ClassVar[tuple[str, ...]] = ("load",)
+    """The sensors (:data:`colift.world.sensing.base.SENSORS`) whose delay it suffers."""

@@ -1,0 +1,56 @@
+"""From a wanted thrust vector to thrust, zero-yaw attitude and body rate (paper eqs. 9 and 10)."""
+
+from __future__ import annotations
+
+from colift.kernel.jit import inline
+from colift.kernel.math import quaternion
+
+AIM = 6
+"""Numbers that it remembers of a drone."""
+
+
+@inline
+def aim(i, fresh, dt, keep, u, norm, memory, o, thrusts, attitudes, rates):  # type: ignore[no-untyped-def]
+    """Commands of drone i for the thrust vector ``u[i]`` of length ``norm``.
+
+    ``memory[o : o + 6]`` holds the last thrust direction and its filtered rate; ``keep`` is the share of
+    the old rate that the filter keeps.
+    """
+    thrusts[i] = norm
+    if norm > 1e-9:
+        hx, hy, hz = u[i, 0] / norm, u[i, 1] / norm, u[i, 2] / norm
+    else:
+        hx, hy, hz = 0.0, 0.0, 1.0
+    if fresh:
+        memory[o] = hx
+        memory[o + 1] = hy
+        memory[o + 2] = hz
+    dx = (1.0 - keep) * (hx - memory[o]) / dt + keep * memory[o + 3]
+    dy = (1.0 - keep) * (hy - memory[o + 1]) / dt + keep * memory[o + 4]
+    dz = (1.0 - keep) * (hz - memory[o + 2]) / dt + keep * memory[o + 5]
+    memory[o] = hx
+    memory[o + 1] = hy
+    memory[o + 2] = hz
+    memory[o + 3] = dx
+    memory[o + 4] = dy
+    memory[o + 5] = dz
+    qw, qx, qy, qz = quaternion.from_thrust_direction(hx, hy, hz)
+    attitudes[i, 0] = qw
+    attitudes[i, 1] = qx
+    attitudes[i, 2] = qy
+    attitudes[i, 3] = qz
+    # Omega_id = 2 Im(q* qdot), with qdot from the rate of the thrust direction.
+    root = 2.0 * qw
+    if root < 1e-3:
+        rates[i, 0] = 0.0
+        rates[i, 1] = 0.0
+        rates[i, 2] = 0.0
+    else:
+        stretch = dz / root
+        w_dot = 0.5 * stretch
+        x_dot = -dy / root + hy * stretch / (root * root)
+        y_dot = dx / root - hx * stretch / (root * root)
+        _, ox, oy, oz = quaternion.multiply(qw, -qx, -qy, 0.0, w_dot, x_dot, y_dot, 0.0)
+        rates[i, 0] = 2.0 * ox
+        rates[i, 1] = 2.0 * oy
+        rates[i, 2] = 2.0 * oz

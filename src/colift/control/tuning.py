@@ -1,0 +1,128 @@
+"""Gains that a loop with a given delay can bear: one rule for the attitude, position and load controllers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from colift.part import Setup
+
+RATE_MARGIN = math.radians(60.0)
+"""Phase margin of the body-rate loop."""
+
+VELOCITY_MARGIN = math.radians(52.0)
+"""Phase margin of the velocity loop."""
+
+DOUBT = 0.25
+"""Share of a predicted delay or lag that still counts: the prediction's model is not the truth."""
+
+LEAN = 0.5
+"""Most that the wanted cable directions answer to a load error: metres that the drones move for a metre."""
+
+
+class Bandwidths(NamedTuple):
+    """Of the cascade, from the inside out, rad/s; each outer loop is critically damped by its inner one."""
+
+    rate: float
+    attitude: float
+    velocity: float
+    position: float
+
+
+class Delays(BaseModel):
+    """What stands between a motion and the answer to it; the settings that delay-aware parts share."""
+
+    delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
+    """Age of the measurements, s."""
+    period: Annotated[float, Field(gt=0.0, le=0.5)] = 0.01
+    """Control period, s."""
+    lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
+    """Time constant of the motors, s."""
+    predicted: bool = True
+    """Whether the delay is made up for by predictors (in the attitude controller and the estimator)."""
+
+    def bandwidths(self) -> Bandwidths:
+        """The rule.
+
+        ``J dOmega/dt = -K_d Omega(t - tau)`` crosses over at ``w = K_d / J`` with the phase margin
+        ``pi/2 - w tau``; ``tau`` is the delay, half a period of the hold, and the motors' lag. What
+        is predicted counts by a quarter. The angle's loop around it is critically damped at a quarter
+        of ``w`` (so ``rho = w / 2``, for the manifold's ``q_e`` is half an angle). The velocity loop
+        sees ``tau`` and the lag ``1 / w`` of an attitude whose wanted rate is fed forward; position again
+        a quarter.
+        """
+        share = DOUBT if self.predicted else 1.0
+        tau = share * (self.delay + self.lag) + 0.5 * self.period
+        rate = (0.5 * math.pi - RATE_MARGIN) / tau
+        velocity = (0.5 * math.pi - VELOCITY_MARGIN) / (tau + 2.0 / rate)
+        return Bandwidths(rate, 0.25 * rate, velocity, 0.25 * velocity)
+
+    def delay_warnings(self, mission: Setup, layer: str) -> Iterable[tuple[str, str]]:
+        """Where the part of a layer is told less than what the sensors, motors and timing of a mission have."""
+        delays = mission.sensing.delays()
+        for sensor in getattr(self, "senses", ()):
+            yield from shorter("delay", self.delay, f"sensing.{sensor}_delay", delays[sensor])
+        yield from lag_warnings(self.lag, mission)
+        yield from shorter("period", self.period, f"timing.{layer}", getattr(mission.timing, layer))
+
+
+def shorter(field: str, told: float, other: str, real: float) -> Iterable[tuple[str, str]]:
+    """A warning where a part is told less time than there is."""
+    if told < real - 1e-9:
+        message = f"is {told:g} s, but {other} is {real:g} s: the part's gains and predictions are for less"
+        yield field, message
+
+
+def lag_warnings(told: float, mission: Setup) -> Iterable[tuple[str, str]]:
+    """A warning where the lag that a part is told is far from that of the motors."""
+    real = mission.actuation.motor_lag()
+    if abs(told - real) > max(0.5 * real, 1e-3):
+        setting = f"actuation of kind {mission.kinds['actuation']} has a lag of {real:g} s"
+        yield "lag", f"is {told:g} s, but {setting}: the controller is tuned for other motors"
+
+
+def loop_growth(
+    gain: float,
+    slope: float,
+    inertia: float,
+    *,
+    period: float,
+    delay: float = 0.0,
+    lag: float = 0.0,
+) -> float:
+    """Factor by which a turn about one axis grows in a control period; above 1 it diverges.
+
+    Of ``J dOmega/dt = tau`` under the sampled law ``tau = -gain (Omega + slope theta / 2)`` (a quaternion holds half
+    of the angle), small angles, with the motors' ``lag`` and measurements that are ``delay`` (s) old: the
+    spectral radius of the loop from one period to the next.
+    """
+    t = period
+    decay = math.exp(-t / lag) if lag > 0.0 else 0.0
+    rest = lag * (1.0 - decay)  # integral of the decay, and its integral
+    rest2 = lag * (t - rest)
+    # theta, Omega, torque that acts
+    A = np.array([[1.0, t, rest2 / inertia], [0.0, 1.0, rest / inertia], [0.0, 0.0, decay]])
+    B = np.array([(0.5 * t * t - rest2) / inertia, (t - rest) / inertia, 1.0 - decay])
+    whole = min(int(delay / t + 1e-9), LONGEST)
+    part = min(max(delay / t - whole, 0.0), 1.0) if whole < LONGEST else 0.0
+    size = 3 + 2 * (whole + 1)
+    M = np.zeros((size, size))
+    law = np.zeros(size)
+    feedback = -gain * np.array([0.5 * slope, 1.0])
+    now = 0 if whole == 0 else 3 + 2 * (whole - 1)
+    law[now : now + 2] += (1.0 - part) * feedback
+    law[3 + 2 * whole :] += part * feedback
+    M[:3, :3] = A
+    M[:3] += np.outer(B, law)
+    M[3:5, :2] = np.eye(2)
+    for k in range(whole):
+        M[5 + 2 * k : 7 + 2 * k, 3 + 2 * k : 5 + 2 * k] = np.eye(2)
+    return float(np.abs(np.linalg.eigvals(M)).max())
+
+
+LONGEST = 50
+"""Most control periods of delay that :func:`loop_growth` looks at."""

@@ -1,0 +1,506 @@
+"""Fly a mission: bind its parts to the team, run the loop, hand back a recording."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.control.allocation.base import AllocatorPart
+from colift.control.reference.descent import Descent
+from colift.errors import ColiftError, Problem, SettingError
+from colift.flight.leg import Leg, Stretch, due_rows, places_of
+from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
+from colift.interrupts import heard
+from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, columns, make_bus
+from colift.mission.mission import Mission
+from colift.mission.schema import Event
+from colift.mission.warnings import warnings_of
+from colift.part import LAYERS, Part, Vector, make
+from colift.record.recording import Recording
+from colift.team import Team
+from colift.team.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
+from colift.wording import numbers
+from colift.world.actuation.base import ActuationPart
+from colift.world.disturbance.base import DisturbancePart
+from colift.world.fault.base import LOAD, Change
+from colift.world.plant.base import Start
+
+Progress = Callable[[float], None]
+"""Called with the fraction flown, between 0 and 1."""
+
+AnyPart = TypeVar("AnyPart", bound=Part)
+
+CHUNK = 1.0
+"""Simulated seconds between two looks at progress and interrupts."""
+
+
+class Flight:
+    """A mission in the air: :meth:`run` flies it to the end, :meth:`advance` a stretch of it.
+
+    Between two stretches settings may change (:meth:`change`) and drones leave or join (:meth:`regroup`).
+
+    Attributes
+    ----------
+    mission : Mission
+    loop_time : float
+        Wall time spent in the loop so far, s.
+    outcome : str
+        ``"completed"``, or how the flight ended.
+    found : list of (time, drone)
+        Drones that were judged lost by the mission's ``detection``, s.
+    descent : str
+        Why the load is brought down because the drones left cannot carry it; empty while they can.
+
+    """
+
+    def __init__(self, mission: Mission) -> None:
+        self.mission = mission
+        self.loop_time = 0.0
+        self.outcome = "completed"
+        self.found: list[tuple[float, int]] = []
+        self.descent = ""
+        self._step = 0
+        self._every = Periods(mission.timing.step, **mission.timing.multiples())
+        self._keys = {layer: random_key(mission.seed, layer) for layer in LAYERS}
+        self._parts: dict[str, Part] = {layer: getattr(mission, layer) for layer in LAYERS}
+        winds_first = sorted(
+            enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
+        )
+        self._disturbances: dict[int, DisturbancePart] = dict(winds_first)
+        self._load_mass = mission.true_team.load_mass
+        self._due = sorted(timetable(mission), key=lambda item: item[0])
+        self._legs: list[Leg] = []
+        drones = mission.first_drones()
+        start = start_state(mission)
+        self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
+        bus = self.bus
+        bus.desired_directions[:] = start.directions
+        bus.received_directions[:] = start.directions
+
+    @property
+    def time(self) -> float:
+        """Simulated time flown, s."""
+        return self._step * self._every.step
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What the mission's parts warned of before the flight (:mod:`colift.mission.warnings`)."""
+        return [str(warning) for warning in warnings_of(self.mission)]
+
+    @property
+    def compiled(self) -> bool:
+        """Whether every part is compiled, and so the loop."""
+        return self._legs[-1].circuit.compiled
+
+    @property
+    def bus(self) -> Any:
+        """All signals now, of the drones that fly (:attr:`drones`)."""
+        return self._legs[-1].bus
+
+    @property
+    def wires(self) -> Any:
+        """The kernel of each layer with its parameters and memory, by layer (:class:`~colift.flight.loop.Wires`)."""
+        return self._legs[-1].circuit.wires
+
+    @property
+    def drones(self) -> list[int]:
+        """Numbers of the drones that fly, in the order of the signals."""
+        return self._legs[-1].drones
+
+    def run(self, progress: Progress | None = None) -> Recording:
+        """Fly from where we are to the end of the mission.
+
+        A flight whose numbers stop being finite ends there; the recording says so in ``outcome``.
+        """
+        steps = self.mission.timing.steps
+        chunk = max(1, round(CHUNK / self._every.step))
+        with heard() as interrupted:
+            while self._step < steps and self.outcome == "completed":
+                self._fly_to(min(steps, (self._step // chunk + 1) * chunk))
+                interrupted()
+                if progress is not None:
+                    progress(self._step / steps)
+        return self.recording()
+
+    def advance(self, duration: float) -> None:
+        """Fly on for ``duration`` (s), to the nearest physics step, past the mission's end if need be."""
+        self._fly_to(self._step + round(duration / self._every.step))
+
+    @property
+    def parts(self) -> dict[str, Part]:
+        """The parts that fly now, by section: a layer's name, or ``disturbance.0``."""
+        return {**self._parts, **{f"disturbance.{k}": p for k, p in self._disturbances.items()}}
+
+    @property
+    def load_mass(self) -> float:
+        """The true mass of the load now, kg."""
+        return self._load_mass
+
+    def change(self, path: str, value: Any) -> None:
+        """Set a setting from now on: ``allocation.mu``, ``load.mass`` (the truth's), ``disturbance.0.force``.
+
+        A section, such as ``reference``, takes a table with the ``kind`` and the settings of the part to put in
+        place; ``allocation.kind`` puts another allocator, with its default settings, in place.
+
+        Raises
+        ------
+        SettingError
+            Where the value is refused.
+        ColiftError
+            For a path that is not there, or a setting that cannot change in flight.
+
+        """
+        section, _, name = path.rpartition(".")
+        if path == "load.mass":
+            leg = self._legs[-1]
+            self._load_mass = float(numbers("load.mass", value, (), above=0.0))
+            leg.circuit.wires.plant.params[:] = self.mission.plant.params(
+                self._true_team(leg.drones)
+            )
+        elif path == "allocation.kind":
+            self.replace("allocation", make("allocation", {"kind": value}))
+        elif path in self.parts:
+            self.replace(path, make(path.partition(".")[0], value))
+        elif section in self.parts:
+            self.replace(section, _with(self.parts[section], section, name, value))
+        else:
+            raise ColiftError(f"{path}: there is no such setting")
+
+    def replace(self, section: str, part: Part) -> None:
+        """Put a part in place of that of a section (:attr:`parts`); one of the same kind goes on with its memory.
+
+        Raises
+        ------
+        ColiftError
+            For the plant; for a disturbance of another kind; for a setting that cannot change in flight.
+
+        """
+        leg, before = self._legs[-1], self.parts[section]
+        same = type(part) is type(before)
+        if problems := part.wrong_lengths(self.mission.team.n):
+            raise SettingError([Problem(name, "", text) for name, text in problems]).within(section)
+        packed = part.of(leg.drones).params(leg.team)
+        if section.startswith("disturbance."):
+            if not same:
+                raise ColiftError(f"{section}: only one of the same kind can take its place")
+            assert isinstance(part, DisturbancePart)
+            number = int(section.partition(".")[2])
+            place = list(self._disturbances).index(number)
+            _refill(leg.circuit.disturbances[place].params, packed, section)
+            self._disturbances[number] = part
+        elif section == "plant":
+            raise ColiftError("plant: cannot change in flight")
+        elif same:
+            wire = getattr(leg.circuit.wires, section)
+            if part.memory(leg.team).shape != wire.memory.shape:
+                raise ColiftError(f"{section}: cannot change like this in flight")
+            _refill(wire.params, packed, section)
+            self._parts[section] = part
+        else:
+            self._parts[section] = part
+            self.regroup(self.drones, anew={section})
+
+    def regroup(self, drones: list[int], anew: set[str] | None = None) -> None:
+        """Go on with these drones: who is missing has its cable cut, who is new hangs on a taut one.
+
+        The layers in ``anew`` forget what they remember.
+        """
+        old = self._legs[-1]
+        team = self.mission.team.of(drones)
+        places = places_of(old.drones, drones)
+        stay, new = places[places >= 0], places < 0
+        directions = np.zeros((team.n, 3))
+        directions[~new] = old.bus.directions[stay]
+        for i in np.flatnonzero(new):
+            taken = directions[np.linalg.norm(directions, axis=1) > 0.0]
+            directions[i] = widest_gap(taken, np.radians(self.mission.start.cone_deg))
+        start = Start(
+            load_position=old.bus.load[0],
+            load_velocity=old.bus.load[1],
+            directions=directions,
+            attitudes=np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1)),
+        )
+        memory = {
+            layer: fresh
+            if layer in (anew or ())
+            else self._parts[layer].carry_over(
+                getattr(old.circuit.wires, layer).memory, fresh, places
+            )
+            for layer, fresh in self._fresh_memory(team, start).items()
+        }
+        self._begin_leg(drones, memory)
+        bus = self.bus
+        for signal in SIGNALS:
+            now, before = getattr(bus, signal.name), getattr(old.bus, signal.name)
+            if signal.shape[0] in {"n", "n+1"}:
+                now[: team.n][~new] = before[stay]
+                now[team.n :] = before[len(old.drones) :]
+            else:
+                now[:] = before
+        bus.desired_directions[new] = bus.received_directions[new] = directions[new]
+
+    def recording(self, since: float = 0.0) -> Recording:
+        """What has been recorded, from ``since`` (s) on; NaN for a drone that has left."""
+        every, n = self._every, self.mission.drones.count
+        begin = max(self._legs[0].begin, round(since / every.step))
+        first, rows = -(-begin // every.recording), due_rows(begin, self._step, every.recording)
+        arrays = {s.name: np.empty((rows, *s.shape_for(n))) for s in SIGNALS}
+        cycles = []
+        filled = 0
+        for leg in self._legs:
+            log, answers = leg.recorded(begin, every)
+            cycles.append(answers)
+            end = filled + len(log)
+            where = columns(leg.team.n)
+            gone = np.setdiff1d(np.arange(n), leg.drones)
+            for s in SIGNALS:
+                values = log[:, where[s.name]].reshape(len(log), *s.shape_for(leg.team.n))
+                rows_of = arrays[s.name][filled:end]
+                if len(gone) == 0 or s.shape[0] not in {"n", "n+1"}:
+                    rows_of[:] = values
+                else:
+                    rows_of[:, leg.drones] = values[:, : leg.team.n]
+                    rows_of[:, n:] = values[:, leg.team.n :]
+                    rows_of[:, gone] = np.nan
+            filled = end
+        allocations = np.concatenate(cycles)
+        for k, signal in enumerate(CYCLE_SIGNALS):
+            arrays[signal.name] = allocations[:, k]
+        first_cycle = -(-begin // every.allocation)
+        return Recording(
+            mission=self.mission,
+            time=np.arange(first, first + rows, dtype=np.float64) * (every.recording * every.step),
+            cycle_time=np.arange(first_cycle, first_cycle + len(allocations), dtype=np.float64)
+            * (every.allocation * every.step),
+            arrays=arrays,
+            provenance={"warnings": self.warnings} if self.warnings else {},
+            outcome=(self.descent or self.outcome) if self.outcome == "completed" else self.outcome,
+        )
+
+    @property
+    def bytes_per_second(self) -> float:
+        """What is recorded in a second of flight."""
+        every = self._every
+        row, cycle = self.bus.row.size / every.recording, CYCLE_WIDTH / every.allocation
+        return float(8.0 * (row + cycle) / every.step)
+
+    @property
+    def last_allocations(self) -> NDArray[np.float64]:
+        """Of the last stretch flown: (allocations, as in :data:`CYCLE_SIGNALS`)."""
+        stretches = self._legs[-1].stretches
+        return stretches[-1].cycles if stretches else np.zeros((0, CYCLE_WIDTH))
+
+    def forget(self, before: float) -> None:
+        """Drop what was recorded in stretches that ended by a time (s)."""
+        step = round(before / self._every.step)
+        for leg in self._legs:
+            leg.forget(step)
+        self._legs = [leg for leg in self._legs[:-1] if leg.stretches] + self._legs[-1:]
+
+    def snapshot(self) -> Snapshot:
+        """The flight as it is now, to go on from once more: :meth:`restore`."""
+        return Snapshot(
+            step=self._step,
+            outcome=self.outcome,
+            found=tuple(self.found),
+            descent=self.descent,
+            load_mass=self._load_mass,
+            due=tuple(self._due),
+            parts=dict(self._parts),
+            disturbances=dict(self._disturbances),
+            legs=tuple((leg, leg.begin, tuple(leg.stretches)) for leg in self._legs),
+            state=tuple(each.copy() for each in self._legs[-1].state()),
+        )
+
+    def restore(self, before: Snapshot) -> None:
+        """Go back to a snapshot of this flight; what follows is the same again, bit for bit.
+
+        Parts that keep something outside of their memory, as plain Python may, do not go back.
+        """
+        self._step, self.outcome, self.descent = before.step, before.outcome, before.descent
+        self.found, self._due, self._load_mass = (
+            list(before.found), list(before.due), before.load_mass
+        )  # fmt: skip
+        self._parts, self._disturbances = dict(before.parts), dict(before.disturbances)
+        self._legs = [leg for leg, _, _ in before.legs]
+        for leg, begin, stretches in before.legs:
+            leg.begin, leg.stretches = begin, deque(stretches)
+        for vector, kept in zip(self._legs[-1].state(), before.state, strict=True):
+            vector[:] = kept
+
+    def _fly_to(self, stop: int) -> None:
+        """Fly to a step; on the way apply what is due, and regroup when a drone is judged lost."""
+        while self._step < stop and self.outcome == "completed":
+            while self._due and self._due[0][0] <= self._step:
+                self._apply(self._due.pop(0)[1])
+            self._advance(min(stop, self._due[0][0]) if self._due else stop)
+            leg = self._legs[-1]
+            if not np.isfinite(leg.bus.row).all():
+                self.outcome = f"diverged before t = {self.time:g} s"
+            elif not leg.bus.carrying.all():
+                lost = [d for d, ok in zip(leg.drones, leg.bus.carrying, strict=True) if not ok]
+                self.found += [(self.time, drone) for drone in lost]
+                if len(lost) < len(leg.drones):
+                    self.lose(lost)
+                else:
+                    self.outcome = f"no drone left to carry at t = {self.time:g} s"
+
+    def lose(self, lost: list[int]) -> None:
+        """Go on without these drones; if the others cannot hold the load in hover, bring it down."""
+        rest = [drone for drone in self.drones if drone not in lost]
+        if not self.descent and (reason := self._cannot_carry(rest)):
+            self.descent = f"descended from t = {self.time:g} s: {reason}"
+            position, velocity = self.bus.reference[:2].tolist()
+            self._parts["reference"] = Descent(position=position, velocity=velocity, at=self.time)
+        self.regroup(rest)
+
+    def _cannot_carry(self, drones: list[int]) -> str:
+        """Why these drones cannot carry the load on; empty when they can, as far as their models say."""
+        bus, team = self.bus, self.mission.team.of(drones)
+        actuation = self._parts["actuation"].of(drones)
+        allocation = self._parts["allocation"].of(drones)
+        assert isinstance(actuation, ActuationPart)
+        assert isinstance(allocation, AllocatorPart)
+        directions = bus.desired_directions[[self.drones.index(drone) for drone in drones]]
+        problems = [message for _, message in actuation.conflicts(team)]
+        problems += allocation.cannot_hold(team, actuation.thrust_limits(team), directions)
+        return "; ".join(problems)
+
+    def _advance(self, stop: int) -> None:
+        """Run the loop up to a step, or until it ends early; keep what it recorded."""
+        leg, every = self._legs[-1], self._every
+        loop: Any = advance if leg.circuit.compiled else getattr(advance, "py_func", advance)
+        log = np.zeros((due_rows(self._step, stop, every.recording), leg.bus.row.size))
+        cycles = np.zeros((due_rows(self._step, stop, every.allocation), CYCLE_WIDTH))
+        begin = time.perf_counter()
+        reached = loop(self._step, stop, every, *leg.circuit.arguments, log, cycles)
+        self.loop_time += time.perf_counter() - begin
+        log = log[: due_rows(self._step, reached, every.recording)]
+        cycles = cycles[: due_rows(self._step, reached, every.allocation)]
+        leg.stretches.append(Stretch(self._step, reached, log, cycles))
+        self._step = reached
+
+    def _apply(self, due: Event | Change) -> None:
+        """Let an event or a fault happen, now."""
+        drones = self.drones
+        if isinstance(due, Change):
+            signal = getattr(self.bus, due.signal)
+            value = np.array(due.value, dtype=np.float64)  # None becomes NaN
+            if due.drone == LOAD:
+                signal = signal[-1:]
+            elif due.drone in drones:
+                place = drones.index(due.drone)
+                signal = signal[place : place + 1]
+            elif due.drone is not None:
+                return
+            np.copyto(signal, value, where=~np.isnan(value))
+        elif due.field == "drones.lose":
+            if due.value in drones and len(drones) > 1:
+                self.lose([due.value])
+        elif due.field == "drones.join":
+            self.regroup(sorted([*drones, due.value]))
+        else:
+            self.change(due.field, due.value)
+
+    def _fresh_memory(self, team: Team, start: Start) -> dict[str, Vector]:
+        memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
+        return {**memory, "plant": self.mission.plant.initial(team, start)}
+
+    def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
+        """From here on these drones of the mission fly; every layer is bound to their team."""
+        old, team = self._legs[-1] if self._legs else None, self.mission.team.of(drones)
+        disturbances = []
+        for place, (number, part) in enumerate(self._disturbances.items()):
+            remembered = part.memory(team)
+            if old is not None:
+                before = old.circuit.disturbances[place].memory
+                remembered = part.carry_over(before, remembered, places_of(old.drones, drones))
+            key = random_key(self.mission.seed, f"disturbance.{number}")
+            packed = part.of(drones).params(team)
+            disturbances.append((type(part), key, packed, remembered))
+        params = {layer: self._parts[layer].of(drones).params(team) for layer in LAYERS[:-1]}
+        params["plant"] = self.mission.plant.params(self._true_team(drones))
+        bus = make_bus(team.n)
+        parts = {layer: type(part) for layer, part in self._parts.items()}
+        wired = circuit(bus, parts, self._keys, params, memory, disturbances)
+        self._legs.append(Leg(drones, team, bus, wired, self._step))
+
+    def _true_team(self, drones: list[int]) -> Team:
+        return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
+
+
+class Snapshot(NamedTuple):
+    """What :meth:`Flight.restore` needs to go on from a moment once more."""
+
+    step: int
+    outcome: str
+    found: tuple[tuple[float, int], ...]
+    descent: str
+    load_mass: float
+    due: tuple[tuple[int, Event | Change], ...]
+    parts: dict[str, Part]
+    disturbances: dict[int, DisturbancePart]
+    legs: tuple[tuple[Leg, int, tuple[Stretch, ...]], ...]
+    state: tuple[NDArray[np.float64], ...]
+
+
+def timetable(mission: Mission) -> list[tuple[int, Event | Change]]:
+    """Events and the changes that faults make, each with its step."""
+    due: list[tuple[float, Event | Change]] = [(event.at, event) for event in mission.events]
+    for number, fault in enumerate(mission.fault):
+        rng = np.random.default_rng([mission.seed, number])
+        found = fault.resolve(rng, mission.drones.count, mission.timing.duration)
+        due += [(change.at, change) for change in found]
+    return [(round(at / mission.timing.step), item) for at, item in due]
+
+
+def random_key(seed: int, name: str) -> int:
+    """Key of one part's random numbers (:mod:`colift.kernel.math.noise`): any integer of 64 bits."""
+    digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
+    return int.from_bytes(digest[:8], "big", signed=True)
+
+
+def _with(part: AnyPart, section: str, name: str, value: Any) -> AnyPart:
+    """A copy with one setting changed, validated."""
+    try:
+        return type(part)(**{**part.model_dump(), name: value})
+    except SettingError as error:
+        raise error.within(section) from error
+
+
+def _refill(vector: Vector, packed: Vector, path: str) -> None:
+    if packed.shape != vector.shape:
+        raise ColiftError(f"{path}: cannot change in flight")
+    vector[:] = packed
+
+
+def start_state(mission: Mission) -> Start:
+    """Of the drones that fly at first: at rest on the start formation, each drone's thrust holding its share of the load.
+
+    The attitude is the zero-yaw one for the static thrust, so that the flight starts in balance.
+    """
+    drones = mission.first_drones()
+    team = mission.team.of(drones)
+    directions = mission.start_directions()
+    first = mission.reference.sample(np.zeros(1), team)[0]
+    weight = [0.0, 0.0, team.load_mass * team.gravity]
+    tensions = np.maximum(min_norm_tensions(directions, weight), 0.0)
+    thrust = -tensions[:, None] * directions
+    thrust[:, 2] += team.masses * team.gravity
+    norms = np.linalg.norm(thrust, axis=1, keepdims=True)
+    upward = np.array([0.0, 0.0, 1.0])
+    aim = np.where(norms > 1e-9, thrust / np.maximum(norms, 1e-9), upward)
+    return Start(
+        load_position=first[0] + np.asarray(mission.start.load_offset),
+        load_velocity=np.zeros(3),
+        directions=directions,
+        attitudes=zero_yaw_quaternion(aim),
+    )

@@ -1,0 +1,224 @@
+"""The paper's block diagram, and the world around it, as one loop over physics steps (paper fig. 2).
+
+    reference -> load control -> allocation -> link -> position control -> attitude control
+        ^                                                                        |
+    estimation <- sensing <- plant <- disturbances, actuation  <-----------------+
+
+The loop is compiled when every part is, and runs as plain Python otherwise: same code, `advance` or
+`advance.py_func`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from colift.catalogue import LAYERS
+from colift.control.allocation.base import INFO_SIZE, Status
+from colift.errors import ColiftError
+from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns, vector
+from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named
+from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
+from colift.world.disturbance import push
+
+Array = NDArray[np.float64]
+
+FUNCTIONS = {
+    **{layer: (layer, "kernel") for layer in LAYERS},
+    "plant_observe": ("plant", "observe"),
+}
+"""Layer and name of the function behind each port of which a flight has one."""
+
+
+Wires = named_tuple("Wires", FUNCTIONS, __name__)
+"""One :class:`~colift.kernel.ports.Wire` a port."""
+Common = named_tuple(
+    "Common",
+    [
+        "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
+        "peak_tensions", "catch_impulses", "carrying",
+    ],
+    __name__,
+)  # fmt: skip
+"""What the loop itself sees and writes of the bus."""
+
+
+class Periods(NamedTuple):
+    """Physics step (s) and each layer's period, in physics steps."""
+
+    step: float
+    load_control: int
+    allocation: int
+    position_control: int
+    attitude_control: int
+    recording: int
+
+
+CYCLE_WIDTH = len(CYCLE_SIGNALS)
+_SILENT = int(Status.SILENT)
+
+SIGNATURE = i8(
+    i8,
+    i8,
+    named([f8] + [i8] * 5, Periods),
+    named([PORTS[name].type for name in Wires._fields], Wires),
+    i8,
+    types.UniTuple(PORTS["disturbance"].type, MAX_DISTURBANCES),
+    named([matrix if name == "external_forces" else vector for name in Common._fields], Common),
+    matrix,
+    matrix,
+)
+
+# Compiled code knows functions by the names of this file.
+_observe, _step = PORTS["plant_observe"].invoke, PORTS["plant"].invoke
+_sense, _estimate = PORTS["sensing"].invoke, PORTS["estimation"].invoke
+_refer, _control_load = PORTS["reference"].invoke, PORTS["load_control"].invoke
+_allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
+_control_position = PORTS["position_control"].invoke
+_control_attitude = PORTS["attitude_control"].invoke
+_actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
+_disturb = PORTS["disturbance"].invoke
+
+
+@kernel(SIGNATURE)
+def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycles):  # type: ignore[no-untyped-def]
+    """Run physics steps ``first <= k < last``; return the step reached.
+
+    It ends early, after a whole step, when a drone is judged lost: the caller regroups. The rows of ``log`` and
+    ``cycles`` are those due from ``first`` on. Of the wires ``disturbing`` the first ``disturbances`` are in use.
+    """
+    dt = every.step
+    n = bus.tensions.shape[0]
+    first_row = (first + every.recording - 1) // every.recording
+    first_cycle = (first + every.allocation - 1) // every.allocation
+    for k in range(first, last):
+        t = k * dt
+        _observe(wires.plant_observe, k, t, dt)
+        _sense(wires.sensing, k, t, dt)
+        _estimate(wires.estimation, k, t, dt)
+        _refer(wires.reference, k, t, dt)
+
+        if k % every.load_control == 0:
+            _control_load(wires.load_control, k, t, every.load_control * dt)
+
+        if k % every.allocation == 0:
+            row = k // every.allocation - first_cycle
+            if bus.allocator_up[0] != 0.0:
+                begin = monotonic_ns()
+                status = _allocate(wires.allocation, k, t, every.allocation * dt)
+                end = monotonic_ns()
+                cycles[row, 0] = status
+                for m in range(INFO_SIZE):
+                    cycles[row, 1 + m] = bus.allocator_info[m]
+                cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9
+            else:  # nothing was asked, so nothing was measured
+                cycles[row, :] = np.nan
+                cycles[row, 0] = _SILENT
+
+        _transmit(wires.link, k, t, dt)
+
+        if k % every.position_control == 0:
+            _control_position(wires.position_control, k, t, every.position_control * dt)
+            _detect(wires.detection, k, t, every.position_control * dt)
+
+        if k % every.attitude_control == 0:
+            _control_attitude(wires.attitude_control, k, t, every.attitude_control * dt)
+
+        _actuate(wires.actuation, k, t, dt)
+        bus.wind[:] = 0.0
+        bus.external_forces[:] = 0.0
+        for m in range(disturbances):
+            _disturb(disturbing[m], k, t, dt)
+        _step(wires.plant, k, t, dt)
+
+        if k % every.recording == 0:
+            log[k // every.recording - first_row, :] = bus.row
+            bus.peak_tensions[:] = 0.0
+            bus.catch_impulses[:] = 0.0
+        for i in range(n):
+            if bus.carrying[i] == 0.0:
+                return k + 1
+    return last
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """All that the loop calls, wired to one bus."""
+
+    wires: Any
+    disturbances: tuple[Wire, ...]
+    common: Any
+
+    @cached_property
+    def compiled(self) -> bool:
+        """Whether every kernel is compiled, and so the loop can be."""
+        return all(is_compiled(wire.kernel) for wire in (*self.wires, *self.disturbances))
+
+    @cached_property
+    def arguments(self) -> tuple[Any, ...]:
+        """As :func:`advance` takes them, compiled or not."""
+        if not self.compiled:
+            return self.wires, len(self.disturbances), self.disturbances, self.common
+        wires = type(self.wires)(*(wire.compiled() for wire in self.wires))
+        port, used = PORTS["disturbance"], [wire.compiled() for wire in self.disturbances]
+        spare = port.wire(push.Push.kernel, np.zeros(0), np.zeros(0), port.signals(1)).compiled()
+        filled = (*used, *[spare] * (MAX_DISTURBANCES - len(used)))
+        return wires, len(used), filled, self.common
+
+
+def circuit(
+    bus: Any,
+    parts: Mapping[str, type],
+    keys: Mapping[str, int],
+    params: Mapping[str, Array],
+    memory: Mapping[str, Array],
+    disturbances: Iterable[tuple[type, int, Array, Array]],
+) -> Circuit:
+    """Wire the parts of all layers, and disturbances with key, parameters and memory, to a bus.
+
+    Raises
+    ------
+    ColiftError
+        For a compiled kernel that was not compiled for its layer's signature.
+
+    """
+    signals = bus._asdict()
+    wires = {
+        name: PORTS[name].wire(
+            _checked(layer, parts[layer], function, PORTS[name].signature),
+            params[layer], memory[layer], signals, key=keys[layer],
+        )
+        for name, (layer, function) in FUNCTIONS.items()
+    }  # fmt: skip
+    port = PORTS["disturbance"]
+    others = tuple(
+        port.wire(
+            _checked("disturbance", part, "kernel", port.signature), own, kept, signals, key=key
+        )
+        for part, key, own, kept in disturbances
+    )
+    common = Common(*(signals[name] for name in Common._fields))
+    return Circuit(Wires(**wires), others, common)
+
+
+def is_compiled(function: Any) -> bool:
+    """Whether a part's kernel is compiled (and so can go into the compiled loop)."""
+    return hasattr(function, "py_func")
+
+
+def _checked(layer: str, part: type, name: str, wanted: Any) -> Any:
+    function = getattr(part, name)
+    offered = getattr(function, "nopython_signatures", [wanted])
+    if (wanted.args, wanted.return_type) not in [(s.args, s.return_type) for s in offered]:
+        raise ColiftError(
+            f"{layer} part {part.__name__}: its {name} is compiled for "
+            f"{', '.join(map(str, offered)) or 'nothing'}, but this layer's functions have "
+            f"the signature {wanted} (see colift.kernel.ports)"
+        )
+    return function

@@ -1,6 +1,0 @@
-"""Real flights become recordings: one file a log format, found by looking; see `base` for the contract."""
-
-from colift.importing._recording import Assumed, import_flight
-from colift.importing.base import Finding, Log, Reading, formats, read
-
-__all__ = ["Assumed", "Finding", "Log", "Reading", "formats", "import_flight", "read"]

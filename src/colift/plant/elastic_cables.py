@@ -1,9 +1,0 @@
-"""Massless elastic cables: one spring and damper each that only pulls (see :mod:`colift.plant._chain`)."""
-
-from __future__ import annotations
-
-from colift.plant._chain import ChainPart
-
-
-class ElasticCables(ChainPart):
-    """Massless cables that stretch, with damping, and do not push."""

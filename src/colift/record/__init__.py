@@ -1,0 +1,1 @@
+"""What a flight leaves behind, and what is read from it: needs no part and no kernel."""

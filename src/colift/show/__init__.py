@@ -1,0 +1,1 @@
+"""Pictures and pages of recordings and studies."""

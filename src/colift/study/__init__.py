@@ -1,0 +1,1 @@
+"""Many flights, or many calls of an allocator, and what they tell."""

@@ -1,0 +1,449 @@
+"""What the safe allocator guarantees, shown: attacked alone, and flown beside the paper's allocator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from colift.control.allocation.base import INFO_SIZE, AllocatorPart, Status, ask
+from colift.control.allocation.limits.feasibility import spread_formation
+from colift.control.allocation.limits.reach import out_of_reach
+from colift.control.allocation.safe import Safe
+from colift.control.allocation.sqp import Sqp
+from colift.flight.runner import run
+from colift.kernel.jit import address_of, f8, i8, kernel, matrix, monotonic_ns, vector, void
+from colift.kernel.math import shares
+from colift.team import Team
+from colift.team.geometry import Array, pairwise_angles
+
+if TYPE_CHECKING:
+    from colift.flight.flight import Progress
+
+PERIOD = 0.01
+"""Control period of the attacks, s."""
+GRAVITY = 9.81
+SLICE = 5_000
+"""Cycles that are judged at a time; memory does not grow with their number."""
+ANGLE_TOLERANCE = 0.1
+"""By how much a wanted angle may fall short of the limit, degrees."""
+BALANCE_TOLERANCE = 1e-8
+"""Error of the force balance that must be told by the status, N."""
+AVOIDABLE = 1e-3
+"""Largest share of cycles that may miss part of a force that is not proved to be out of reach."""
+ACTUAL_MARGIN = 3.0
+"""By how much actual angles may fall short of the limit in flight, degrees."""
+CONES = {2: 35.0, 3: 35.0, 4: 35.0, 6: 45.0, 8: 60.0, 12: 65.0, 16: 70.0, 64: 70.0}
+"""Half-angle of the cone in which the attacks start, degrees."""
+LEAST_ANGLES = {12: 25.0, 16: 25.0, 20: 22.0, 24: 20.0, 64: 11.0}
+"""Least angle asked for where 30 degrees are too wide for the team, degrees."""
+
+
+@kernel(
+    void(
+        i8,
+        matrix,
+        matrix,
+        f8,
+        vector,
+        vector,
+        vector,
+        matrix,
+        vector,
+        matrix,
+        matrix,
+    )
+)
+def _attack(  # type: ignore[no-untyped-def]
+    allocate, forces, accelerations, dt, params, memory, tensions, directions, info, reference, out
+):
+    """Call an allocator once per force; a row of ``out``: status, ns, tensions (n), directions (3n)."""
+    n = tensions.shape[0]
+    for k in range(forces.shape[0]):
+        for m in range(3):
+            reference[2, m] = accelerations[k, m]
+        begin = monotonic_ns()
+        out[k, 0] = ask(
+            allocate, forces[k], reference, dt, params, memory, tensions, directions, info
+        )
+        out[k, 1] = monotonic_ns() - begin
+        for i in range(n):
+            out[k, 2 + i] = tensions[i]
+            for m in range(3):
+                out[k, 2 + n + 3 * i + m] = directions[i, m]
+
+
+def _smooth(t: Array, rng: np.random.Generator) -> Array:
+    return np.column_stack([3 * np.sin(1.9 * t), 3 * np.sin(1.4 * t), np.sin(1.1 * t)])
+
+
+def _noise(t: Array, rng: np.random.Generator) -> Array:
+    slow = np.column_stack([np.sin(0.6 * t), 0 * t, 0 * t])
+    return np.asarray(slow + 0.3 * rng.standard_normal((len(t), 3)))
+
+
+def _coloured(t: Array, rng: np.random.Generator) -> Array:
+    keep = math.exp(-PERIOD / 0.3)
+    shocks = math.sqrt(1 - keep**2) * rng.standard_normal((len(t), 3))
+    states = np.zeros((len(t), 3))
+    for k in range(1, len(t)):
+        states[k] = keep * states[k - 1] + shocks[k]
+    return states
+
+
+def _steps(t: Array, rng: np.random.Generator) -> Array:
+    levels = rng.uniform(-3, 3, (len(t) // 50 + 1, 3))
+    return np.repeat(levels, 50, axis=0)[: len(t)]
+
+
+def _adversary(t: Array, rng: np.random.Generator) -> Array:
+    lengths = np.cumsum(rng.random(len(t)) < 0.05)
+    levels = rng.choice([-1.0, 0.0, 1.0], (lengths[-1] + 1, 3)) * [3.0, 3.0, 4.0]
+    return np.asarray(levels[lengths] + 0.3 * rng.standard_normal((len(t), 3)))
+
+
+FAMILIES: dict[str, Callable[[Array, np.random.Generator], Array]] = {
+    "smooth": _smooth,
+    "noise": _noise,
+    "coloured": _coloured,
+    "steps": _steps,
+    "adversary": _adversary,
+}
+"""Wanted accelerations of the load (rows, 3), m/s^2, at the given times."""
+
+
+@dataclass(frozen=True)
+class Attack:
+    """How one allocator stood one family of forces; angles in degrees, times in us.
+
+    ``limits_broken_by`` is the worst excess over any other limit, N for tensions and rad for cone and turn.
+    ``yield_share`` of the cycles do not give the whole force; ``avoidable_share`` are those of them whose
+    force is not *proved* to be out of reach, see :mod:`colift.control.allocation.limits.reach`.
+    """
+
+    n: int
+    family: str
+    allocator: str
+    cycles: int
+    least_angle: float
+    smallest_angle: float
+    limits_broken_by: float
+    unflagged_imbalance: int
+    yield_share: float
+    avoidable_share: float
+    not_finite: int
+    median_us: float
+    p99_us: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether every promise was kept in every cycle."""
+        return (
+            self.smallest_angle >= self.least_angle - ANGLE_TOLERANCE
+            and self.limits_broken_by <= 1e-6
+            and self.unflagged_imbalance == 0
+            and self.avoidable_share <= AVOIDABLE
+            and self.not_finite == 0
+        )
+
+
+def problem(n: int) -> tuple[Team, Safe]:
+    """Team and limits of the attacks: load and ``mu`` keep the paper's cone whatever n is."""
+    team = Team.uniform(n, load_mass=0.225 * max(1.0, n / 4))
+    return team, Safe(
+        mu=0.15 * min(1.0, 4 / n) if n > 4 else 0.15, min_angle_deg=LEAST_ANGLES.get(n, 30.0)
+    )
+
+
+class Answers(NamedTuple):
+    """A slice of an attack: one row per cycle.
+
+    ``forces`` (k, 3), N; ``before`` (k, n, 3), directions before the cycle; ``tensions`` (k, n), N; ``directions``
+    (k, n, 3); ``status`` (k,); ``times`` (k,), us.
+    """
+
+    forces: Array
+    before: Array
+    tensions: Array
+    directions: Array
+    status: Array
+    times: Array
+
+    def missing(self) -> Array:
+        """Size (k,) of the part of each force that was not given, N."""
+        given = np.einsum("ki,kim->km", self.tensions, self.directions)
+        return np.asarray(np.linalg.norm(given + self.forces, axis=1))
+
+
+def answers(
+    n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0, period: float = PERIOD
+) -> Iterator[Answers]:
+    """Send one seeded family of forces through one allocator, called every ``period`` (s)."""
+    team, limits = problem(n)
+    rng = np.random.default_rng([seed, n, list(FAMILIES).index(family)])
+    least = math.radians(limits.min_angle_deg + 1.0)
+    cone = math.radians(CONES.get(n, 70.0))
+    directions = np.ascontiguousarray(spread_formation(n, cone, least))
+    tensions, info = np.zeros(n), np.zeros(INFO_SIZE)
+    params, memory = part.params(team), part.memory(team)
+    every = round(period / PERIOD)
+    for begin in range(0, cycles, SLICE):
+        k = np.arange(every * begin, every * min(begin + SLICE, cycles), dtype=np.float64)
+        accelerations = np.ascontiguousarray(FAMILIES[family](PERIOD * k, rng)[::every])
+        forces = np.ascontiguousarray(
+            team.load_mass * (accelerations + np.array([0.0, 0.0, GRAVITY]))
+        )
+        out = np.zeros((len(forces), 2 + 4 * n))
+        first = directions.copy()
+        _attack(
+            address_of(type(part).kernel), forces, accelerations, period, params, memory, tensions, directions,
+            info, np.zeros((4, 3)), out,
+        )  # fmt: skip
+        alpha = out[:, 2 + n :].reshape(-1, n, 3)
+        before = np.concatenate([first[None], alpha[:-1]])
+        yield Answers(forces, before, out[:, 2 : 2 + n], alpha, out[:, 0], out[:, 1] / 1e3)
+
+
+def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0) -> Attack:
+    """Send one seeded family of forces through one allocator and judge every answer."""
+    limits = problem(n)[1]
+    smallest, broken, unflagged, yields, avoidable, bad = 180.0, 0.0, 0, 0, 0, 0
+    times = []
+    reach = (
+        limits.tension_floors(n),
+        limits.tension_caps(n),
+        limits.max_rate * PERIOD,
+        math.radians(limits.max_cone_deg),
+    )
+    flagged = [int(s) for s in Status if not s.ok]
+    for found in answers(n, family, cycles, part, seed=seed):
+        T, alpha, previous = found.tensions, found.directions, found.before
+        bad += int(np.count_nonzero(~(np.isfinite(T).all(1) & np.isfinite(alpha).all((1, 2)))))
+        smallest = min(smallest, float(np.degrees(pairwise_angles(alpha).min())))
+        chord = np.linalg.norm(alpha - previous, axis=2)
+        turned = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+        over = (
+            np.max(T) - float(np.max(limits.tension_max)),
+            float(np.min(limits.tension_min)) - np.min(T),
+            np.max(np.arccos(np.clip(-alpha[..., 2], -1, 1))) - math.radians(limits.max_cone_deg),
+            np.max(turned) - limits.max_rate * PERIOD,
+        )
+        broken = max(broken, *(float(x) for x in over))
+        told = np.isin(found.status, flagged)
+        short = found.missing() > BALANCE_TOLERANCE
+        unflagged += int(np.count_nonzero(short & ~told))
+        yields += int(np.count_nonzero(short))
+        proved = out_of_reach(found.forces[short], previous[short], *reach)
+        avoidable += int(np.count_nonzero(~proved))
+        times.append(found.times)
+    microseconds = np.concatenate(times)
+    return Attack(
+        n=n,
+        family=family,
+        allocator=type(part).__name__.lower(),
+        cycles=cycles,
+        least_angle=limits.min_angle_deg,
+        smallest_angle=smallest,
+        limits_broken_by=broken,
+        unflagged_imbalance=unflagged,
+        yield_share=yields / cycles,
+        avoidable_share=avoidable / cycles,
+        not_finite=bad,
+        median_us=float(np.median(microseconds)),
+        p99_us=float(np.percentile(microseconds, 99)),
+    )
+
+
+BELOW = [[0.5, 0.0, -0.8], [-0.3, 0.5, -0.8], [-0.3, -0.5, -0.8], [0.3, 0.1, 0.8]]
+SCALED = {"allocation.kind": "safe", "allocation.mu_scaling": "weight"}
+
+FLIGHTS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
+    "spiral from rest, cables 7 deg apart": ("from-rest", {}, {}),
+    "one drone starts below the load": ("paper-spiral", {"start.directions": BELOW}, {}),
+    "figure eight at 5 m/s^2": (
+        "figure-eight",
+        {"reference.length": 1.4, "reference.width": 0.7, "reference.period": 4.2},
+        {},
+    ),
+    "four drones, then three": ("four-to-three", {}, {}),
+    "eight drones, then seven": ("eight-to-seven", {}, {}),
+    "three drones, then four": ("three-to-four", {}, {}),
+    "twice the load": ("paper-spiral", {"load.mass": 0.45}, SCALED),
+    "four times the load": ("paper-spiral", {"load.mass": 0.9}, SCALED),
+    "one hour of spiral": (
+        "paper-spiral",
+        {"timing.duration": 3600.0, "timing.recording": 0.05},
+        {},
+    ),
+}
+"""Flights by title: mission, changes for both allocators, further changes for the safe one.
+
+Both fly with the position controller that feeds the cables' motion forward: it is better for both.
+"""
+
+UNSETTLED = 5.0
+"""Time for which a start that breaks the limits may go on doing so, s."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """One flight with one allocator; lengths in m, angles in degrees."""
+
+    title: str
+    allocator: str
+    outcome: str
+    smallest_angle: float
+    smallest_angle_later: float
+    tracking_rms: float
+    tracking_max: float
+    slack_time: float
+    failures: int
+    limited: int
+
+    @property
+    def survives(self) -> bool:
+        """Whether the flight ended, stayed near its path and kept its cables from meeting."""
+        return self.outcome == "completed" and self.tracking_max < 0.2 and self.smallest_angle > 5.0
+
+    @property
+    def separated(self) -> bool:
+        """Whether actual angles kept the limit less the margin, once the start was settled."""
+        return self.smallest_angle_later >= 30.0 - ACTUAL_MARGIN
+
+
+def fly(title: str, allocator: str, *, quick: bool = False) -> Flown:
+    """Fly one of :data:`FLIGHTS` with the safe allocator or the paper's."""
+    mission, changes, safe_only = FLIGHTS[title]
+    overrides = {
+        "position_control.kind": "feed-forward",
+        **changes,
+        "allocation.kind": allocator,
+        **(safe_only if allocator == "safe" else {}),
+    }
+    if quick and "timing.duration" in overrides:
+        overrides["timing.duration"] = 60.0
+    flown = run(mission, overrides=overrides)
+    r, m = flown.recording, flown.metrics
+    later = r["directions"][r.time >= UNSETTLED]
+    return Flown(
+        title=title,
+        allocator=allocator,
+        outcome=r.outcome,
+        smallest_angle=m["min_angle_deg"],
+        smallest_angle_later=float(np.degrees(np.nanmin(pairwise_angles(later))))
+        if len(later)
+        else math.nan,
+        tracking_rms=m["tracking_rms_m"],
+        tracking_max=m["tracking_max_m"],
+        slack_time=m["slack_time_s"],
+        failures=int(m["allocator_failures"]),
+        limited=int(m["allocator_limited"]),
+    )
+
+
+def show_all(
+    sizes: list[int], cycles: int, *, quick: bool = False, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Every attack and every flight, as plain data with verdicts."""
+    jobs = len(sizes) * len(FAMILIES) + len(FLIGHTS)
+    done = 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / jobs)
+
+    attacks, flights = [], []
+    for n in sizes:
+        safe = problem(n)[1]
+        for family in FAMILIES:
+            for part in (safe, Sqp(mu=safe.mu)):
+                found = attack(n, family, cycles, part)
+                attacks.append({**asdict(found), "holds": found.holds})
+            tick()
+    for title in FLIGHTS:
+        ours, paper = (fly(title, name, quick=quick) for name in ("safe", "sqp"))
+        for flown in (ours, paper):
+            verdict = {"survives": flown.survives, "separated": flown.separated}
+            flights.append({**asdict(flown), **verdict, "verdict": _verdict(ours, paper)})
+        tick()
+    return {"cycles": cycles, "attacks": attacks, "flights": flights}
+
+
+def _verdict(ours: Flown, paper: Flown) -> str:
+    """In words: does the safe allocator fly, keep apart, and track no worse than the paper's."""
+    faults = []
+    if not ours.survives:
+        faults.append(f"does not survive: {ours.outcome}, {100 * ours.tracking_max:.0f} cm off")
+    if not ours.separated:
+        faults.append(f"actual angle falls to {ours.smallest_angle_later:.1f} deg")
+    if paper.survives and ours.tracking_rms > 1.05 * paper.tracking_rms:
+        worse = ours.tracking_rms / paper.tracking_rms
+        faults.append(f"tracks {worse:.1f} times worse than the paper's allocator")
+    words = "; ".join(faults) or "holds"
+    return words if paper.survives else f"{words}; the paper's allocator does not survive"
+
+
+def _percent(share: float, cycles: int) -> str:
+    """A share of cycles in percent, its interval behind it."""
+    low, high = shares.interval(round(share * cycles), cycles)
+    return f"{100 * share:.3f} ({shares.percent(low, high, 3).removesuffix(' %')})"
+
+
+def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[str]]]]:
+    """The result as titled tables: header and rows of text."""
+    rows = []
+    for ours, paper in zip(result["attacks"][::2], result["attacks"][1::2], strict=True):
+        rows.append(
+            [
+                str(ours["n"]),
+                ours["family"],
+                f"{ours['least_angle']:.0f}",
+                f"{ours['smallest_angle']:.2f}",
+                f"{paper['smallest_angle']:.2f}",
+                _percent(ours["yield_share"], ours["cycles"]),
+                _percent(ours["avoidable_share"], ours["cycles"]),
+                f"{ours['median_us']:.1f}",
+                f"{ours['p99_us']:.1f}",
+                "holds" if ours["holds"] else "BROKEN",
+            ]
+        )
+    yield (
+        f"Allocators alone, {result['cycles']} cycles of 10 ms each: angles in degrees, times in us; shares with "
+        "their 95 % interval, as if cycles were independent",
+        [
+            "n",
+            "forces",
+            "limit",
+            "safe",
+            "paper's",
+            "yield %",
+            "avoid %",
+            "median",
+            "p99",
+            "limits",
+        ],
+        rows,
+    )
+    rows = [
+        [
+            f["title"],
+            f["allocator"],
+            f"{f['smallest_angle']:.1f}",
+            f"{f['smallest_angle_later']:.1f}",
+            f"{100 * f['tracking_rms']:.2f}",
+            f"{100 * f['tracking_max']:.1f}",
+            f"{f['slack_time']:.2f}",
+            f["verdict"] if f["allocator"] == "safe" else "",
+        ]
+        for f in result["flights"]
+    ]
+    yield (
+        "In flight: actual angles in degrees (whole flight, after 5 s), tracking in cm, slack in s",
+        ["flight", "with", "angle", "later", "RMS", "max", "slack", "verdict"],
+        rows,
+    )

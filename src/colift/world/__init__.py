@@ -1,0 +1,1 @@
+"""All that is simulated; it never sees the controllers."""

@@ -1,0 +1,111 @@
+"""Drag of drones, load and cables in the air that moves past them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from colift.kernel.jit import inline, kernel
+from colift.kernel.math import quaternion
+from colift.part import Vector
+from colift.team import Team
+from colift.world.disturbance.base import SIGNATURE, DisturbancePart
+
+Area = Annotated[float, Field(ge=0.0, le=10.0)]
+Linear = Annotated[float, Field(ge=0.0, le=10.0)]
+
+# Gauss and Legendre's three points on (0, 1): exact for polynomials up to degree five.
+_POINTS = (0.5 - 0.5 * math.sqrt(0.6), 0.5, 0.5 + 0.5 * math.sqrt(0.6))
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+
+
+@inline
+def _on_body(velocity, wind, quadratic, linear, force):  # type: ignore[no-untyped-def]
+    """Add the drag of a body to the force on it: ``(rho C_d A / 2 |w| + c) w`` in the relative wind w."""
+    x, y, z = wind[0] - velocity[0], wind[1] - velocity[1], wind[2] - velocity[2]
+    scale = quadratic * math.sqrt(x * x + y * y + z * z) + linear
+    force[0] += scale * x
+    force[1] += scale * y
+    force[2] += scale * z
+
+
+@kernel(SIGNATURE)
+def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    attitudes, directions, thrusts = sees.attitudes, sees.directions, sees.applied_thrusts
+    attached = sees.attached
+    wind, external = writes.wind, writes.external_forces
+    n = positions.shape[0]
+    half_rho = 0.5 * params[0]
+    _on_body(load[1], wind, half_rho * params[3], params[4], external[n])
+    for i in range(n):
+        _on_body(velocities[i], wind, half_rho * params[1], params[2], external[i])
+        if params[5] > 0.0:
+            # In the rotors' plane, in proportion to thrust: blades flap and drag unevenly.
+            axis = quaternion.third_axis(
+                attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
+            )
+            along = 0.0
+            for k in range(3):
+                along += axis[k] * (wind[k] - velocities[i, k])
+            for k in range(3):
+                across = wind[k] - velocities[i, k] - along * axis[k]
+                external[i, k] += params[5] * thrusts[i] * across
+        if attached[i] == 0.0 or params[6] == 0.0:
+            continue
+        length = 0.0
+        for k in range(3):
+            length += (load[0, k] - positions[i, k]) * directions[i, k]
+        for m in range(3):
+            s = _POINTS[m]
+            along = squared = 0.0
+            for k in range(3):
+                past = wind[k] - (1.0 - s) * velocities[i, k] - s * load[1, k]
+                along += past * directions[i, k]
+                squared += past * past
+            normal = math.sqrt(max(squared - along * along, 0.0))
+            scale = _WEIGHTS[m] * half_rho * params[6] * length * normal
+            for k in range(3):
+                past = wind[k] - (1.0 - s) * velocities[i, k] - s * load[1, k]
+                force = scale * (past - along * directions[i, k])
+                external[i, k] += (1.0 - s) * force
+                external[n, k] += s * force
+
+
+class Drag(DisturbancePart):
+    """Quadratic and linear drag in the relative wind; that of a cable goes to its two ends.
+
+    Across a cable acts ``rho C_d d / 2 |w_n| w_n`` per length, with the wind ``w_n`` across it (the
+    cross-flow principle; Hoerner, "Fluid-Dynamic Drag", 1965, ch. 3). It is integrated along the straight
+    cable and shared between drone and load by the lever rule, which for a massless cable is exact.
+    The rotors' own drag is linear in speed and thrust (Faessler, Franchi, Scaramuzza, RA-L 2018).
+    """
+
+    kernel = _drag
+    feels_wind: ClassVar[bool] = True
+
+    air_density: Annotated[float, Field(ge=0.0, le=10.0)] = 1.225
+    """kg/m^3."""
+    drone_area: Area = 0.012
+    """Drag coefficient times frontal area of a drone's body, m^2."""
+    drone_linear: Linear = 0.0
+    """Linear drag of a drone, N s/m."""
+    load_area: Area = 0.006
+    """Drag coefficient times frontal area of the load, m^2 (about that of a cube of 7.5 cm)."""
+    load_linear: Linear = 0.0
+    """Linear drag of the load, N s/m."""
+    rotor_drag: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Force in the rotors' plane per thrust and speed across it, s/m; small racing quadrotors have some
+    0.05, that is half their weight at 10 m/s."""
+    cable_diameter: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0015
+    """m."""
+    cable_coefficient: Annotated[float, Field(ge=0.0, le=3.0)] = 1.2
+    """Drag coefficient of the cables across the wind (a cylinder's below Re = 10^5)."""
+
+    def params(self, team: Team) -> Vector:
+        drone, load = (self.drone_area, self.drone_linear), (self.load_area, self.load_linear)
+        cable = self.cable_diameter * self.cable_coefficient
+        return np.array([self.air_density, *drone, *load, self.rotor_drag, cable])

@@ -1,0 +1,187 @@
+"""What the plants share: the state of load and drones, their motion without cables, the integrator.
+
+The state begins with position and velocity of the load (6 numbers); then 13 numbers per drone:
+position and velocity (world), attitude ``q`` (wxyz) and body rate ``Omega``. Cables are no part of it,
+so that a drone whose cable is cut or slack needs no other description than one that carries.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math import quaternion
+from colift.part import Places, Vector, carry_rows
+from colift.team import Team
+from colift.team.geometry import min_norm_tensions
+from colift.world.plant.base import OBSERVE_SIGNATURE, STATE, PlantPart, Start
+
+LOAD: int = STATE.at.rows
+DRONE: int = STATE.at.width
+PARAMS = Layout(team={"m_L": 1, "g": 1}, drone={"m": 1, "L": 1, "J": 3})
+MASS: int = PARAMS.at.rows
+BODY: int = PARAMS.at.width
+"""Where the first drone's numbers stand in the parameters, and how many each has."""
+
+
+def state_size(n: int) -> int:
+    """Length of the state of load and drones."""
+    return STATE.size(n)
+
+
+@inline
+def free_motion(n, y, thrusts, torques, external, params, dy):  # type: ignore[no-untyped-def]
+    """Time derivative of the state without cables (paper eqs. 1 to 3 with T = 0)."""
+    m_L, g = params[0], params[1]
+    for k in range(3):
+        dy[k] = y[3 + k]
+        dy[3 + k] = external[n, k] / m_L
+    dy[5] -= g
+    for i in range(n):
+        o = LOAD + DRONE * i
+        m = params[MASS + BODY * i]
+        qw, qx, qy, qz = y[o + 6], y[o + 7], y[o + 8], y[o + 9]
+        ux, uy, uz = quaternion.third_axis(qw, qx, qy, qz)
+        f = thrusts[i]
+        dy[o], dy[o + 1], dy[o + 2] = y[o + 3], y[o + 4], y[o + 5]
+        dy[o + 3] = (f * ux + external[i, 0]) / m
+        dy[o + 4] = (f * uy + external[i, 1]) / m
+        dy[o + 5] = (f * uz + external[i, 2]) / m - g
+        p, q, r = y[o + 10], y[o + 11], y[o + 12]
+        dw, dx, dy_, dz = quaternion.multiply(qw, qx, qy, qz, 0.0, 0.5 * p, 0.5 * q, 0.5 * r)
+        dy[o + 6], dy[o + 7], dy[o + 8], dy[o + 9] = dw, dx, dy_, dz
+        jx = params[MASS + BODY * i + 2]
+        jy = params[MASS + BODY * i + 3]
+        jz = params[MASS + BODY * i + 4]
+        dy[o + 10] = (torques[i, 0] - (jz - jy) * q * r) / jx
+        dy[o + 11] = (torques[i, 1] - (jx - jz) * r * p) / jy
+        dy[o + 12] = (torques[i, 2] - (jy - jx) * p * q) / jz
+
+
+@inline
+def runge_kutta(stage, size, dt, begin, slope, total, y):  # type: ignore[no-untyped-def]
+    """Take the slope of stage 0 to 3 of the classical method; ``y`` becomes where the next one is due.
+
+    ``begin`` is the state at the beginning, ``total`` collects; after stage 3 ``y`` is the answer.
+    """
+    if stage == 0:
+        for k in range(size):
+            total[k] = slope[k]
+            y[k] = begin[k] + 0.5 * dt * slope[k]
+    elif stage < 3:
+        part = 0.5 * dt if stage == 1 else dt
+        for k in range(size):
+            total[k] += 2.0 * slope[k]
+            y[k] = begin[k] + part * slope[k]
+    else:
+        for k in range(size):
+            y[k] = begin[k] + dt / 6.0 * (total[k] + slope[k])
+
+
+@inline
+def normalise(n, y):  # type: ignore[no-untyped-def]
+    """Pull the quaternions back to unit norm."""
+    for i in range(n):
+        o = LOAD + DRONE * i + 6
+        norm = math.sqrt(
+            y[o] * y[o] + y[o + 1] * y[o + 1] + y[o + 2] * y[o + 2] + y[o + 3] * y[o + 3]
+        )
+        for k in range(4):
+            y[o + k] /= norm
+
+
+@inline
+def line(y, o):  # type: ignore[no-untyped-def]
+    """Unit vector and distance to the load from the body whose state begins at ``o``.
+
+    Down where the two coincide, which is a direction too.
+    """
+    x, y_, z = y[0] - y[o], y[1] - y[o + 1], y[2] - y[o + 2]
+    d = math.sqrt(x * x + y_ * y_ + z * z)
+    if d > 1e-12:
+        return x / d, y_ / d, z / d, d
+    return 0.0, 0.0, -1.0, d
+
+
+@inline
+def raise_peaks(n, T, peak_tensions):  # type: ignore[no-untyped-def]
+    """Keep the largest tension of each cable and, last, the largest sum of their sizes."""
+    total = 0.0
+    for i in range(n):
+        total += abs(T[i])
+        peak_tensions[i] = max(peak_tensions[i], T[i])
+    peak_tensions[n] = max(peak_tensions[n], total)
+
+
+@inline
+def catch_impulse(i, parting, params):  # type: ignore[no-untyped-def]
+    """Impulse that stops drone ``i`` and the load, parting along the cable at this speed, when nothing else does."""
+    m_L, m = params[0], params[MASS + BODY * i]
+    return parting * m * m_L / (m + m_L)
+
+
+@kernel(OBSERVE_SIGNATURE)
+def observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, positions, velocities = writes.load, writes.positions, writes.velocities
+    attitudes, rates, directions = writes.attitudes, writes.rates, writes.directions
+    direction_rates = writes.direction_rates
+    y = memory
+    for k in range(3):
+        load[0, k] = y[k]
+        load[1, k] = y[3 + k]
+    for i in range(positions.shape[0]):
+        o = LOAD + DRONE * i
+        ax, ay, az, d = line(y, o)
+        vx, vy, vz = y[3] - y[o + 3], y[4] - y[o + 4], y[5] - y[o + 5]
+        along = ax * vx + ay * vy + az * vz
+        d = max(d, 1e-12)
+        directions[i, 0], directions[i, 1], directions[i, 2] = ax, ay, az
+        direction_rates[i, 0] = (vx - along * ax) / d
+        direction_rates[i, 1] = (vy - along * ay) / d
+        direction_rates[i, 2] = (vz - along * az) / d
+        for k in range(3):
+            positions[i, k] = y[o + k]
+            velocities[i, k] = y[o + 3 + k]
+            rates[i, k] = y[o + 10 + k]
+        for k in range(4):
+            attitudes[i, k] = y[o + 6 + k]
+
+
+class BodiesPart(PlantPart):
+    """Base of the plants whose memory begins with the state of load and drones."""
+
+    observe = observe
+
+    def params(self, team: Team) -> Vector:
+        return PARAMS.pack(
+            team.n, m_L=team.load_mass, g=team.gravity, m=team.masses, L=team.cable_lengths,
+            J=team.inertias,
+        )  # fmt: skip
+
+    def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Lengths (n,) of the cables under these tensions, m."""
+        return team.cable_lengths
+
+    def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
+        """Memory at the start, with the cables as long as the tensions that hold the load make them."""
+        memory = self.memory(team)
+        weight = [0.0, 0.0, team.load_mass * team.gravity]
+        tensions = np.maximum(min_norm_tensions(start.directions, weight), 0.0)
+        spans = self.stretched(team, tensions)[:, None] * start.directions
+        memory[0:3] = start.load_position
+        memory[3:LOAD] = start.load_velocity
+        drones = memory[LOAD : state_size(team.n)].reshape(team.n, DRONE)
+        drones[:, 0:3] = start.load_position - spans
+        drones[:, 3:6] = start.load_velocity
+        drones[:, 6:10] = start.attitudes
+        return memory
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        # A new drone joins the load where it is by now, not where it was when last observed.
+        joining = fresh[LOAD : state_size(places.size)].reshape(places.size, DRONE)
+        joining[:, :LOAD] += old[:LOAD] - fresh[:LOAD]
+        return carry_rows(old, fresh, LOAD, DRONE, places)

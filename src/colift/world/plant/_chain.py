@@ -1,0 +1,308 @@
+"""Cables as chains of springs that only pull, with or without masses between them.
+
+A cable is ``k + 1`` equal segments with ``k`` beads between; the ends are the drone and the load. A segment that is
+longer than its share ``l`` of the cable by ``s`` pulls with ``max(0, (EA / l) (s + tau ds/dt))``. The state of load and
+drones is followed by 6 numbers per bead, position and velocity, drone by drone.
+
+Waves along a cable are so much faster than anything else that viscous damping, which grows with frequency as no
+braid's does, would dictate the step for their sake. So a segment is damped by its own rate only as far as the undamped
+waves' step allows; the rest of ``tau`` acts on the mean rate of the cable's segments, which is how load and drone bounce.
+It takes energy, too: where it would push, it is cut for all segments alike. On a bent cable it moves beads as well, and is
+limited to what the step can follow.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from colift.kernel.jit import inline, kernel
+from colift.part import Places, Vector
+from colift.team import Team
+from colift.world.plant._bodies import (
+    BODY,
+    DRONE,
+    LOAD,
+    MASS,
+    BodiesPart,
+    catch_impulse,
+    free_motion,
+    line,
+    normalise,
+    raise_peaks,
+    runge_kutta,
+    state_size,
+)
+from colift.world.plant.base import STEP_SIGNATURE, Start
+
+BEAD = 6
+CABLE = 5
+"""Parameters per cable, after those of the bodies: stiffness of a segment, its damping by its own rate and by the mean
+rate of its cable's segments, bead mass, drag."""
+COURANT = 1.5
+"""Substep times the fastest rate; the integrator is stable to 2.6 at least."""
+MILD = 0.5
+"""Substep times the rate at which damping of the mean rate may slow it down."""
+SHORTEST = 1e-6
+"""Shortest substep that a plant may ask for, s."""
+
+
+@inline
+def segment(y, a, b):  # type: ignore[no-untyped-def]
+    """Unit vector from node a to node b, their distance, and its rate."""
+    x, y_, z = y[b] - y[a], y[b + 1] - y[a + 1], y[b + 2] - y[a + 2]
+    d = math.sqrt(x * x + y_ * y_ + z * z)
+    scale = 1.0 / max(d, 1e-12)
+    x *= scale
+    y_ *= scale
+    z *= scale
+    rate = x * (y[b + 3] - y[a + 3]) + y_ * (y[b + 4] - y[a + 4]) + z * (y[b + 5] - y[a + 5])
+    return x, y_, z, d, rate
+
+
+@inline
+def derivative(n, k, y, thrusts, torques, external, attached, longest, params, T, dy):  # type: ignore[no-untyped-def]
+    """Time derivative of the state; fills the tensions ``T`` at the load's end."""
+    free_motion(n, y, thrusts, torques, external, params, dy)
+    beads, cables = LOAD + DRONE * n, MASS + BODY * n
+    wind = cables + CABLE * n
+    for i in range(n):
+        c = cables + CABLE * i
+        stiffness, damping, together = params[c], params[c + 1], params[c + 2]
+        bead_mass, drag = params[c + 3], params[c + 4]
+        length = params[MASS + BODY * i + 1] / (k + 1)
+        for j in range(k):
+            o = beads + BEAD * (k * i + j)
+            dy[o], dy[o + 1], dy[o + 2] = y[o + 3], y[o + 4], y[o + 5]
+            dy[o + 3], dy[o + 4], dy[o + 5] = 0.0, 0.0, -params[1]
+        T[i] = 0.0
+        segments = k + 1 if attached[i] > 0.0 else k
+        common = 0.0
+        if together > 0.0 and attached[i] > 0.0:
+            least, total = math.inf, 0.0
+            px = py = pz = 0.0
+            bend = 0.0
+            a = LOAD + DRONE * i
+            for j in range(k + 1):
+                b = beads + BEAD * (k * i + j) if j < k else 0
+                x, y_, z, d, rate = segment(y, a, b)
+                total += rate
+                least = min(least, d - length)
+                if j > 0:
+                    bend += (x - px) ** 2 + (y_ - py) ** 2 + (z - pz) ** 2
+                px, py, pz = x, y_, z
+                a = b
+            if least > 0.0:
+                mobility = 1.0 / params[MASS + BODY * i] + bend / bead_mass + 1.0 / params[0]
+                together = min(together, MILD * (k + 1) / (longest * mobility))
+                common = max(together * total / (k + 1), -stiffness * least)
+        a, mass_a = LOAD + DRONE * i, params[MASS + BODY * i]
+        for j in range(segments):
+            b, mass_b = beads + BEAD * (k * i + j), bead_mass
+            if j == k:
+                b, mass_b = 0, params[0]
+            x, y_, z, d, rate = segment(y, a, b)
+            if d > length:
+                pull = max(0.0, stiffness * (d - length) + damping * rate + common)
+                fx, fy, fz = pull * x, pull * y_, pull * z
+                dy[a + 3] += fx / mass_a
+                dy[a + 4] += fy / mass_a
+                dy[a + 5] += fz / mass_a
+                dy[b + 3] -= fx / mass_b
+                dy[b + 4] -= fy / mass_b
+                dy[b + 5] -= fz / mass_b
+                if j == k:
+                    T[i] = pull
+            if (
+                drag > 0.0
+            ):  # across the segment, by the air's speed past its middle; half to each end
+                vx = params[wind] - 0.5 * (y[a + 3] + y[b + 3])
+                vy = params[wind + 1] - 0.5 * (y[a + 4] + y[b + 4])
+                vz = params[wind + 2] - 0.5 * (y[a + 5] + y[b + 5])
+                along = vx * x + vy * y_ + vz * z
+                vx -= along * x
+                vy -= along * y_
+                vz -= along * z
+                half = 0.5 * drag * d * math.sqrt(vx * vx + vy * vy + vz * vz)
+                dy[a + 3] += half * vx / mass_a
+                dy[a + 4] += half * vy / mass_a
+                dy[a + 5] += half * vz / mass_a
+                dy[b + 3] += half * vx / mass_b
+                dy[b + 4] += half * vy / mass_b
+                dy[b + 5] += half * vz / mass_b
+            a, mass_a = b, mass_b
+
+
+@inline
+def note_catches(n, y, attached, T, params, parting, catch_impulses):  # type: ignore[no-untyped-def]
+    """Keep how fast the ends of each slack cable part (-1 while taut), and the catch when they are its length apart.
+
+    Beads pull a little before that: what counts is the speed before they did.
+    """
+    for i in range(n):
+        if parting[i] < 0.0 and T[i] > 0.0:
+            continue
+        o = LOAD + DRONE * i
+        x, y_, z, d = line(y, o)
+        if attached[i] == 0.0:
+            parting[i] = 0.0
+        elif d > params[MASS + BODY * i + 1]:
+            if parting[i] > 0.0:
+                catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, parting[i], params))
+            parting[i] = -1.0
+        else:
+            along = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
+            free = T[i] == 0.0 or along <= 0.0
+            parting[i] = max(along, 0.0 if free else parting[i])
+
+
+@kernel(STEP_SIGNATURE)
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions = writes.tensions, writes.peak_tensions
+    catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
+    n = thrusts.shape[0]
+    k, longest = int(params[params.shape[0] - 1]), params[params.shape[0] - 2]
+    size = LOAD + DRONE * n + BEAD * k * n
+    y = memory[:size]
+    begin = memory[size : 2 * size]
+    total = memory[2 * size : 3 * size]
+    slope = memory[3 * size : 4 * size]
+    T = memory[4 * size : 4 * size + n]
+    parting = memory[4 * size + n : 4 * size + 2 * n]
+    substeps = math.ceil(dt / longest)
+    h = dt / substeps
+    for substep in range(substeps):
+        for m in range(size):
+            begin[m] = y[m]
+        for stage in range(4):
+            derivative(n, k, y, thrusts, torques, external, attached, longest, params, T, slope)
+            runge_kutta(stage, size, h, begin, slope, total, y)
+            if stage > 0:
+                continue
+            raise_peaks(n, T, peak_tensions)
+            note_catches(n, begin, attached, T, params, parting, catch_impulses)
+            for i in range(n):
+                if substep == 0:
+                    tensions[i] = T[i]
+                if T[i] == 0.0 and attached[i] > 0.0:
+                    slack_times[i] += h
+        normalise(n, y)
+
+
+class ChainPart(BodiesPart):
+    """Base of the plants with springs for cables."""
+
+    kernel = _step
+
+    stiffness: Annotated[float, Field(gt=0.0, le=1e9)] = 4e4
+    """EA of the cables, force per relative stretch, N (braided Dyneema of 1 mm: about 4e4)."""
+    damping_ratio: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    """Of drone and load bouncing on one cable."""
+
+    @property
+    def bead_count(self) -> int:
+        """Beads per cable."""
+        return 0
+
+    @property
+    def line_density(self) -> float:
+        """Mass of the cables per length, kg/m."""
+        return 0.0
+
+    @property
+    def line_drag(self) -> float:
+        """Drag of the cables per length and squared speed across them, kg/m^2."""
+        return 0.0
+
+    @property
+    def wind(self) -> tuple[float, float, float]:
+        """Velocity of the air around the cables, world, m/s."""
+        return (0.0, 0.0, 0.0)
+
+    def _cables(self, team: Team) -> tuple[Team, NDArray[np.float64], float]:
+        """The team with the ends' share of the cables' mass, parameters (n, 5) of the cables, longest substep."""
+        k, n = self.bead_count, team.n
+        share = self.line_density * team.cable_lengths / (k + 1)
+        loaded = Team(
+            load_mass=team.load_mass + 0.5 * float(share.sum()),
+            masses=team.masses + 0.5 * share,
+            inertias=team.inertias,
+            cable_lengths=team.cable_lengths,
+            gravity=team.gravity,
+        )
+        stiffness = self.stiffness * (k + 1) / team.cable_lengths
+        bounce = np.sqrt(
+            self.stiffness / team.cable_lengths * (1.0 / team.masses + 1.0 / team.load_mass)
+        )
+        delay = 2.0 * self.damping_ratio / bounce
+        # Gershgorin: squared rate of a segment's mode, by the segments that share its two ends.
+        ends = np.array([n / loaded.load_mass + 1.0 / loaded.masses])
+        if k:
+            beads = 2.0 / share
+            ends = np.array(
+                [1.0 / loaded.masses + beads, 2.0 * beads, beads + n / loaded.load_mass]
+            )
+        fastest = np.sqrt((stiffness * ends).max(axis=0))
+        own = np.minimum(delay, 1.0 / fastest)
+        drag = np.full(n, self.line_drag)
+        cables = np.column_stack(
+            [stiffness, stiffness * own, stiffness * (delay - own), share, drag]
+        )
+        return loaded, cables, COURANT / float(fastest.max())
+
+    def params(self, team: Team) -> Vector:
+        loaded, cables, longest = self._cables(team)
+        tail = [*self.wind, longest, float(self.bead_count)]
+        return np.concatenate([super().params(loaded), cables.ravel(), tail])
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(4 * (state_size(team.n) + BEAD * self.bead_count * team.n) + 2 * team.n)
+
+    def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(team.cable_lengths * (1.0 + tensions / self.stiffness))
+
+    def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
+        """Straight cables, as long as the tensions that hold the load make them."""
+        memory = super().initial(team, start)
+        k, first = self.bead_count, state_size(team.n)
+        drones = memory[LOAD:first].reshape(team.n, 1, DRONE)
+        beads = memory[first : first + BEAD * k * team.n].reshape(team.n, k, BEAD)
+        down = np.arange(1, k + 1)[:, None] / (k + 1)
+        beads[:] = (1.0 - down) * drones[:, :, :BEAD] + down * memory[:LOAD]
+        return memory
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        width = BEAD * self.bead_count
+        now, before = state_size(places.size), state_size(_team_size(old, width))
+        beads = fresh[now : now + width * places.size].reshape(-1, BEAD)
+        beads += old[:LOAD] - fresh[:LOAD]
+        for new, place in enumerate(places):
+            if place >= 0:
+                begin = before + width * place
+                fresh[now + width * new : now + width * (new + 1)] = old[begin : begin + width]
+        return super().carry_over(old, fresh, places)
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        longest = self._cables(team)[2]
+        if longest >= SHORTEST:
+            return []
+        allowed = self.stiffness * (longest / SHORTEST) ** 2
+        return [
+            (
+                "stiffness",
+                f"is so stiff for these masses that it needs steps of {longest:.1g} s, and {SHORTEST:g} s "
+                f"is the least; with the other settings at most {allowed:.2g} N",
+            )
+        ]
+
+
+def _team_size(memory: Vector, width: int) -> int:
+    """Drones whose memory this is, with ``width`` numbers for the beads of each."""
+    return (memory.size - 4 * LOAD) // (4 * (DRONE + width) + 2)

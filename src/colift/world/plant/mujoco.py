@@ -1,0 +1,154 @@
+"""The same bodies in MuJoCo: physics that is not ours, to check ours against.
+
+Drones are free bodies, the load is a point on three slides, a cable is a spatial tendon with an upper limit of its
+length between the two. MuJoCo keeps the limit as a soft constraint whose error decays with ``time_constant``; force and
+stretch of a limit at rest follow from ``impedance`` (MuJoCo documentation, "Solver parameters"). A cut cable is a tendon
+whose limit is off. Integrated by MuJoCo's Runge-Kutta method of order four.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from colift.part import Vector
+from colift.team import Team
+from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
+
+SETTINGS = 4
+"""Parameters after those of the bodies: time constant, damping ratio, impedance, substeps."""
+
+
+class _Scene(NamedTuple):
+    model: Any
+    data: Any  # scratch: every step writes the whole state first
+    qpos: NDArray[np.int64]  # where MuJoCo's positions stand in our state
+    qvel: NDArray[np.int64]
+
+
+def _text(*numbers: float) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def model_xml(params: Vector) -> str:
+    """MJCF of load, drones and cables."""
+    load_mass, gravity = params[:MASS]
+    bodies = params[MASS:-SETTINGS].reshape(-1, BODY)
+    time_constant, damping_ratio, impedance = params[-SETTINGS:-1]
+    limit = (
+        f'limited="true" solreflimit="{_text(time_constant, damping_ratio)}" '
+        f'solimplimit="{_text(impedance, impedance, 1.0)}"'
+    )
+    drones, cables, motors = [], [], []
+    for i, (mass, length, *inertia) in enumerate(bodies):
+        drones.append(
+            f'<body pos="0 0 {_text(length)}"><freejoint/><inertial pos="0 0 0" mass="{_text(mass)}" '
+            f'diaginertia="{_text(*inertia)}"/><site name="{i}"/></body>'
+        )
+        cables.append(
+            f'<spatial {limit} range="0 {_text(length)}"><site site="{i}"/>'
+            '<site site="load"/></spatial>'
+        )
+        motors += [f'<motor site="{i}" gear="{_text(*row)}"/>' for row in np.eye(6)[[2, 3, 4, 5]]]
+    slides = "".join(f'<joint type="slide" axis="{_text(*axis)}"/>' for axis in np.eye(3))
+    return f"""<mujoco><option integrator="RK4" gravity="0 0 {_text(-gravity)}">
+<flag autoreset="disable"/></option>
+<worldbody><body>{slides}<inertial pos="0 0 0" mass="{_text(load_mass)}" diaginertia="1 1 1"/>
+<site name="load"/></body>{"".join(drones)}</worldbody>
+<tendon>{"".join(cables)}</tendon><actuator>{"".join(motors)}</actuator></mujoco>"""
+
+
+@lru_cache(maxsize=8)
+def _scene(params: bytes) -> _Scene:
+    """The model for a parameter vector, made once."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(model_xml(np.frombuffer(params)))
+    drones = LOAD + DRONE * np.arange(model.ntendon)[:, None]
+    return _Scene(
+        model=model,
+        data=mujoco.MjData(model),
+        qpos=np.append(np.arange(3), drones + np.array([0, 1, 2, 6, 7, 8, 9])),
+        qvel=np.append(np.arange(3, LOAD), drones + np.array([3, 4, 5, 10, 11, 12])),
+    )
+
+
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions = writes.tensions, writes.peak_tensions
+    catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
+    import mujoco
+
+    scene = _scene(params.tobytes())
+    model, data, n = scene.model, scene.data, thrusts.shape[0]
+    state, warm_start, parting = np.split(memory, [state_size(n), memory.size - n])
+    if not all(np.abs(a).max() < mujoco.mjMAXVAL for a in (thrusts, torques, external, state)):
+        state[:] = np.nan  # MuJoCo would go on with other numbers; a flight that diverges shall end
+        return
+    # MuJoCo would soften, without a word, a limit that its step cannot follow.
+    substeps = max(int(params[-1]), math.ceil(2.0 * dt / params[-SETTINGS] - 1e-9))
+    model.opt.timestep = dt / substeps
+    model.tendon_limited[:] = attached > 0.0
+    data.qpos[:] = state[scene.qpos]
+    data.qvel[:] = state[scene.qvel]
+    data.qacc_warmstart[:] = warm_start
+    controls = data.ctrl.reshape(n, 4)
+    controls[:, 0] = thrusts
+    controls[:, 1:] = torques
+    data.xfrc_applied[1, :3] = external[n]
+    data.xfrc_applied[2:, :3] = external[:n]
+    reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
+    for substep in range(substeps):
+        mujoco.mj_forward(model, data)
+        limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
+        pulls = np.zeros(n)
+        pulls[data.efc_id[limits]] = data.efc_force[limits]
+        if substep == 0:
+            tensions[:] = pulls
+        np.maximum(peak_tensions, np.append(pulls, pulls.sum()), out=peak_tensions)
+        slack_times[(pulls == 0.0) & (attached > 0.0)] += dt / substeps
+        holds, taut = attached > 0.0, data.ten_length > model.tendon_range[:, 1]
+        np.maximum(catch_impulses, reduced * parting, out=catch_impulses, where=holds & taut)
+        parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity, 0.0), 0.0)
+        mujoco.mj_step(model, data)
+    state[scene.qpos] = data.qpos
+    state[scene.qvel] = data.qvel
+    warm_start[:] = data.qacc_warmstart
+    if data.warning.number.any():
+        mujoco.mj_resetData(model, data)
+        state[:] = np.nan
+
+
+class Mujoco(BodiesPart):
+    """MuJoCo: rigid bodies, and tendons with a soft limit of their length for cables."""
+
+    kernel = _step
+    needs = ("mujoco", "mujoco")
+
+    time_constant: Annotated[float, Field(ge=1e-4, le=1.0)] = 0.002
+    """In which an error of a cable's length decays, s."""
+    damping_ratio: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    """Of that decay."""
+    impedance: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.999
+    """Share of the acceleration that a constraint would need to be exact; nearer to 1 is stiffer."""
+    substeps: Annotated[int, Field(ge=1, le=100)] = 1
+    """MuJoCo's steps per physics step; more where the time constant would be less than two of them."""
+
+    def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
+        softness = (1.0 - self.impedance) * (self.time_constant * self.damping_ratio) ** 2
+        give = softness * tensions * (1.0 / team.masses + 1.0 / team.load_mass)
+        return np.asarray(team.cable_lengths + give)
+
+    def params(self, team: Team) -> Vector:
+        settings = [self.time_constant, self.damping_ratio, self.impedance, self.substeps]
+        return np.append(super().params(team), settings)
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(state_size(team.n) + 3 + 7 * team.n)

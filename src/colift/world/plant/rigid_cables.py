@@ -1,0 +1,62 @@
+"""Quadrotors on rigid massless cables under a point load (paper eqs. 1 to 5), RK4 with projection.
+
+The equations are in :mod:`colift.world.plant._rigid`. A tension may come out negative: a rigid rod would push. That
+time is counted as slack; a rod is never caught.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colift.kernel.jit import kernel
+from colift.part import Vector
+from colift.team import Team
+from colift.world.plant._bodies import (
+    DRONE,
+    LOAD,
+    BodiesPart,
+    raise_peaks,
+    runge_kutta,
+    state_size,
+)
+from colift.world.plant._rigid import derivative, project
+from colift.world.plant.base import STEP_SIGNATURE
+
+
+@kernel(STEP_SIGNATURE)
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions, slack_times = writes.tensions, writes.peak_tensions, writes.slack_times
+    n = thrusts.shape[0]
+    size = LOAD + DRONE * n
+    y = memory[:size]
+    begin = memory[size : 2 * size]
+    total = memory[2 * size : 3 * size]
+    slope = memory[3 * size : 4 * size]
+    T = memory[4 * size : 4 * size + n]
+    b = memory[4 * size + n : 4 * size + 2 * n]
+    alpha = memory[4 * size + 2 * n : 4 * size + 5 * n]
+    for k in range(size):
+        begin[k] = y[k]
+    for stage in range(4):
+        derivative(n, y, thrusts, torques, external, attached, params, T, alpha, b, slope)
+        runge_kutta(stage, size, dt, begin, slope, total, y)
+        if stage == 0:
+            for i in range(n):
+                tensions[i] = T[i]
+            raise_peaks(n, T, peak_tensions)
+    project(n, y, attached, params, T, alpha, b)
+    for i in range(n):
+        if tensions[i] < 0.0:
+            slack_times[i] += dt
+
+
+class RigidCables(BodiesPart):
+    """Rigid massless cables that would push rather than go slack, point load; no settings."""
+
+    kernel = _step
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(4 * state_size(team.n) + 5 * team.n)

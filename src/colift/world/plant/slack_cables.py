@@ -1,0 +1,213 @@
+"""Rigid massless cables that go slack, and taut again with a plastic jerk.
+
+A cable is taut while its drone is at full length and does not come nearer. Among the taut cables tensions solve a
+complementarity problem: none pulls negative, and one without tension does not grow longer. Between events the
+cables that pull are constraints as in :mod:`colift.world.plant._rigid`, the other drones fly free. A tension that falls
+below zero and a slack drone that reaches its full length are events; bisection finds the instant of the first
+within the step. At a catch, impulses along all taut cables solve the same complementarity problem with velocities
+for accelerations; they take kinetic energy away and never add any (the plastic law of Newton, restitution 0).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from colift.kernel.jit import inline, kernel
+from colift.part import Vector
+from colift.team import Team
+from colift.world.plant._bodies import (
+    BODY,
+    DRONE,
+    LOAD,
+    MASS,
+    BodiesPart,
+    catch_impulse,
+    free_motion,
+    line,
+    raise_peaks,
+    runge_kutta,
+    state_size,
+)
+from colift.world.plant._rigid import (
+    closing,
+    demand,
+    derivative,
+    lines,
+    project,
+    pull,
+    solve,
+    tighten,
+)
+from colift.world.plant.base import STEP_SIGNATURE
+
+BISECTIONS = 40
+"""Halvings of a step in search of an event: to 1e-15 s of a step of 1 ms."""
+EVENTS = 8
+"""Events per cable that one step resolves one by one; the cables then at full length stay together to its end."""
+NEAR = 1e-11
+"""Missing length that counts as none, m."""
+SLOW = 1e-5
+"""Speed along the cable that counts as none, m/s: what one catch throws off another bounces ever faster."""
+
+
+@inline
+def complementarity(n, alpha, b, taut, params, held, T):  # type: ignore[no-untyped-def]
+    """Pulls ``T >= 0`` of the taut cables that leave no demand, with equality where a cable pulls.
+
+    Exchanges the first offender until there is none (Murty 1974), which ends as the matrix is positive definite; mostly
+    at once, as all cables pull. ``held`` tells who does.
+    """
+    largest = 0.0
+    for i in range(n):
+        held[i] = taut[i]
+        if taut[i] > 0.0:
+            largest = max(largest, abs(b[i]))
+    tolerance = 1e-12 * largest
+    for _ in range(10 * n + 10):
+        solve(n, alpha, b, held, params, T)
+        px = py = pz = 0.0
+        for i in range(n):
+            px += T[i] * alpha[3 * i]
+            py += T[i] * alpha[3 * i + 1]
+            pz += T[i] * alpha[3 * i + 2]
+        offender = -1
+        for i in range(n):
+            if held[i] > 0.0:
+                wrong = T[i] < -tolerance * params[MASS + BODY * i]
+            else:
+                along = alpha[3 * i] * px + alpha[3 * i + 1] * py + alpha[3 * i + 2] * pz
+                wrong = taut[i] > 0.0 and b[i] - along / params[0] > tolerance
+            if wrong:
+                offender = i
+                break
+        if offender < 0:
+            break
+        held[offender] = 1.0 - held[offender]
+    for i in range(n):
+        T[i] = max(T[i], 0.0)
+
+
+CONTACT = 0.01
+"""Within what time of each other catches are one burst, s: as long as a braided cable pulls before it rebounds."""
+
+
+@inline
+def note_parting(n, y, dt, parting):  # type: ignore[no-untyped-def]
+    """Keep how fast the ends of each slack cable part, unless a burst of catches is on; last, the time since a catch.
+
+    What stops a drone and the load is judged by the speed before any cable of the burst was caught: which of them
+    is caught a microsecond before the others is chance, and each catch changes the load's speed for the next.
+    """
+    parting[n] += dt
+    if parting[n] <= CONTACT:
+        return
+    for i in range(n):
+        o = LOAD + DRONE * i
+        x, y_, z, _ = line(y, o)
+        parting[i] = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
+
+
+@inline
+def catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses):  # type: ignore[no-untyped-def]
+    """Find the taut cables, those at full length that shorten at most ``slow``; impulses stop any that grow."""
+    lines(n, y, alpha, b)
+    beyond = False
+    for i in range(n):
+        over = b[i] - params[MASS + BODY * i + 1]
+        taut[i] = 1.0 if attached[i] > 0.0 and over > -NEAR else 0.0
+        beyond = beyond or (taut[i] > 0.0 and over > 0.5 * NEAR)
+    if beyond:  # or a cable that is not held would overrun again at once
+        tighten(n, y, taut, params, T, alpha, b)
+        lines(n, y, alpha, b)
+    closing(n, y, alpha, b)
+    jerk = False
+    for i in range(n):
+        if taut[i] > 0.0 and b[i] > SLOW:
+            jerk = True
+            speed = parting[i] if parting[i] > SLOW else b[i]
+            catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, speed, params))
+            parting[i] = parting[n] = 0.0
+    if jerk:
+        complementarity(n, alpha, b, taut, params, held, T)
+        pull(n, alpha, T, params, 3, y)
+        closing(n, y, alpha, b)
+    for i in range(n):
+        if b[i] < -slow:
+            taut[i] = 0.0
+
+
+@kernel(STEP_SIGNATURE)
+def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    attached = sees.attached
+    tensions, peak_tensions = writes.tensions, writes.peak_tensions
+    catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
+    n = thrusts.shape[0]
+    size = LOAD + DRONE * n
+    y = memory[:size]
+    begin = memory[size : 2 * size]
+    total = memory[2 * size : 3 * size]
+    slope = memory[3 * size : 4 * size]
+    rest = memory[4 * size :]
+    T, b, taut, held = rest[:n], rest[n : 2 * n], rest[2 * n : 3 * n], rest[3 * n : 4 * n]
+    alpha, parting = rest[4 * n : 7 * n], rest[7 * n :]
+    note_parting(n, y, dt, parting)
+    left = dt
+    for event in range(EVENTS * n + 1):
+        last = event == EVENTS * n
+        slow = math.inf if last else SLOW
+        catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses)
+        free_motion(n, y, thrusts, torques, external, params, slope)
+        lines(n, y, alpha, b)
+        demand(n, y, slope, alpha, b)
+        complementarity(n, alpha, b, taut, params, held, T)
+        raise_peaks(n, T, peak_tensions)
+        if event == 0:
+            for i in range(n):
+                tensions[i] = T[i]
+        for k in range(size):
+            begin[k] = y[k]
+        low, high, h = 0.0, left, left
+        for trial in range(BISECTIONS + 1):
+            for k in range(size):
+                y[k] = begin[k]
+            for stage in range(5):  # the fifth looks at the tensions of the end
+                derivative(n, y, thrusts, torques, external, held, params, T, alpha, b, slope)
+                if stage < 4:
+                    runge_kutta(stage, size, h, begin, slope, total, y)
+            happened = False
+            for i in range(n):
+                L = params[MASS + BODY * i + 1]
+                if held[i] > 0.0:
+                    m = params[MASS + BODY * i]
+                    happened = happened or T[i] < -1e-9 * m * max(1.0, abs(b[i]))
+                elif attached[i] > 0.0:
+                    happened = happened or line(y, LOAD + DRONE * i)[3] > L + NEAR
+            if last:
+                break
+            if happened:
+                high = h
+            elif h == left:
+                break
+            else:
+                low = h
+            h = high if trial == BISECTIONS - 1 else 0.5 * (low + high)
+        project(n, y, held, params, T, alpha, b)
+        for i in range(n):
+            if attached[i] > 0.0 and held[i] == 0.0:
+                slack_times[i] += high
+        left -= high
+        if left <= 0.0:
+            break
+
+
+class SlackCables(BodiesPart):
+    """Rigid massless cables that go slack instead of pushing and are caught plastically; no settings."""
+
+    kernel = _step
+
+    def memory(self, team: Team) -> Vector:
+        return np.zeros(4 * state_size(team.n) + 8 * team.n + 1)
