@@ -256,7 +256,7 @@ def test_a_live_flight_has_the_moments_of_its_recording(
     while flight.time < 2.001 - 1e-9:
         flight.advance(0.02)
         recent = flight.recording(since=watch.seen)
-        live += watch.look(recent, [drone for _, drone in flight.found])
+        live += watch.look(recent, [drone for _, drone in flight.membership.found])
     whole = replace(flight.recording(), mission=flown_mission(flight.mission, flight, []))
     later = find_moments(whole)
     assert len(later) >= 3

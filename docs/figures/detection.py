@@ -51,7 +51,7 @@ def faulty(name: str, fly_one: Callable[[int, dict[str, Any]], Flight]) -> dict[
     for seed in SEEDS:
         at = 3.0 + 5.0 * (seed - SEEDS[0]) / len(SEEDS)
         fault = {**survival.FAULTS[name], "at": at, "drone": seed % 4}
-        for when, drone in fly_one(seed, fault).found:
+        for when, drone in fly_one(seed, fault).membership.found:
             if drone == seed % 4 and when >= at:
                 own.append(1e3 * (when - at))
             else:
@@ -74,7 +74,7 @@ def fly_faults() -> list[dict[str, Any]]:
 
 def fly_many(load: float) -> dict[str, Any]:
     """Without a fault, in gusts: seeds and judgements of the flights with an alarm."""
-    alarms = {seed: found for seed in MANY if (found := gusty(seed, load).found)}
+    alarms = {seed: found for seed in MANY if (found := gusty(seed, load).membership.found)}
     return {"flights": len(MANY), "alarms": alarms}
 
 

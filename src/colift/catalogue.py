@@ -14,9 +14,10 @@ from typing import Any
 from colift.errors import MissionError, Problem, UnknownNameError
 
 WINGS = {
-    "reference": "control",
     "sensing": "world",
     "estimation": "control",
+    "supervision": "control",
+    "reference": "control",
     "load_control": "control",
     "allocation": "control",
     "link": "world",
@@ -45,6 +46,7 @@ LAYERS = tuple(folder for folder in FOLDERS if folder not in LISTS)
 DEFAULT_KINDS = {
     "sensing": "ideal",
     "estimation": "none",
+    "supervision": "none",
     "load_control": "pid",
     "allocation": "safe",
     "link": "ideal",

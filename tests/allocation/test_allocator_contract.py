@@ -184,10 +184,14 @@ def test_kernel_allocates_no_memory(kind):
         pytest.skip("a plain Python kernel")
 
     @numba.njit
-    def calls(count, forces, address, reference, params, memory, tensions, directions, info):
+    def calls(
+        count, forces, address, reference, nominal, params, memory, tensions, directions, info
+    ):
         for k in range(count):
             force = forces[k % forces.shape[0]]
-            ask(address, force, reference, 0.01, params, memory, tensions, directions, info)
+            ask(
+                address, force, reference, nominal, 0.01, params, memory, tensions, directions, info
+            )
 
     cell = Cell(kind, 4)
     noisy = GOOD + np.random.default_rng(0).normal(size=(64, 3))

@@ -341,7 +341,7 @@ def test_a_drone_lost_on_top_of_it_is_survived(kind):
     flight = Flight(load_mission("real-world", {**IDEAL_ROTORS, "fault": fault, "seed": 3}))
     r = flight.run()
     assert r.outcome == "completed"
-    assert [drone for _, drone in flight.found] == [1]
+    assert [drone for _, drone in flight.membership.found] == [1]
     error = np.linalg.norm(r["load"][:, 0] - r["reference"][:, 0], axis=1)
     assert error[r.time > 9.5].max() < 0.15
 
@@ -352,7 +352,7 @@ def test_a_drone_whose_sensors_stand_still_is_let_go_before_it_does_harm():
     flight = Flight(load_mission("real-world", changes))
     r = flight.run()
     assert r.outcome == "completed"
-    ((when, drone),) = flight.found
+    ((when, drone),) = flight.membership.found
     assert drone == 2
     assert 0.06 < when - 6.0 < 0.2
     error = np.linalg.norm(r["load"][:, 0] - r["reference"][:, 0], axis=1)

@@ -181,7 +181,7 @@ def test_a_silent_cycle_measures_nothing_and_no_metric_takes_it_for_an_answer():
 
 def test_a_released_load_falls_freely_and_nobody_is_blamed():
     flight, r = fly("ideal", {"kind": "load-released"}, duration=AT + 0.5)
-    assert flight.found == []
+    assert flight.membership.found == []
     fall = r["load"][-1, 1, 2] - r["load"][r.time >= AT][0, 1, 2]
     assert fall == pytest.approx(-9.81 * 0.5, rel=0.01)
 
@@ -203,13 +203,15 @@ def test_lost_drones_are_found_and_the_others_carry_on(world, fault):
     for seed in range(3):
         flight, r = fly(world, fault, seed=seed, duration=AT + 2.5)
         assert r.outcome == "completed"
-        assert [drone for _, drone in flight.found] == [1]
-        assert 0.0 < flight.found[0][0] - AT <= 0.16
+        assert [drone for _, drone in flight.membership.found] == [1]
+        assert 0.0 < flight.membership.found[0][0] - AT <= 0.16
         assert flight.drones == [0, 2, 3]
         assert error(r).max() < 0.15
         metrics = compute(r)
         assert metrics["lost_drones"] == 1.0
-        assert metrics["detection_delay_s"] == pytest.approx(flight.found[0][0] - AT, abs=0.006)
+        assert metrics["detection_delay_s"] == pytest.approx(
+            flight.membership.found[0][0] - AT, abs=0.006
+        )
         assert metrics["min_angle_deg"] > 20.0
 
 
@@ -220,7 +222,7 @@ def test_no_false_alarm_without_a_fault():
         wind = {"disturbance.0.speed": 10.0, "disturbance.1.speed": 10.0}
         flight = Flight(load_mission(mission("real", seed=seed, duration=10.0).resolved(), wind))
         r = flight.run()
-        assert flight.found == []
+        assert flight.membership.found == []
         assert r.outcome == "completed"
         worst = max(worst, error(r).max())
     assert 0.02 < worst < 0.3
@@ -241,12 +243,12 @@ def test_no_false_alarm_without_a_fault():
 def test_no_false_alarm_with_a_wrong_model(overrides):
     flight = Flight(load_mission(mission("real", duration=6.0).resolved(), overrides))
     assert flight.run().outcome == "completed"
-    assert flight.found == []
+    assert flight.membership.found == []
 
 
 def test_stuck_sensors_of_the_load_are_nobodys_loss():
     flight, r = fly("real", {"kind": "sensor-stuck", "body": "load", "duration": 0.1})
-    assert flight.found == []
+    assert flight.membership.found == []
     assert r.outcome == "completed"
 
 
@@ -254,9 +256,9 @@ def test_a_drone_whose_sensors_stay_stuck_is_dropped():
     for frozen in (0.0, 0.06):
         fault = {"kind": "sensor-stuck", "duration": 5.0}
         flight, r = fly("real", fault, duration=AT + 2.0, detection__frozen=frozen)
-        assert [drone for _, drone in flight.found] == [1]
+        assert [drone for _, drone in flight.membership.found] == [1]
         assert r.outcome == "completed"
-    assert flight.found[0][0] - AT == pytest.approx(0.06, abs=0.012)
+    assert flight.membership.found[0][0] - AT == pytest.approx(0.06, abs=0.012)
     assert error(r).max() < 0.1
 
 
@@ -268,7 +270,7 @@ def test_two_faults_one_after_the_other():
     ]
     flight = Flight(load_mission(table))
     r = flight.run()
-    assert [drone for _, drone in flight.found] == [4, 0]
+    assert [drone for _, drone in flight.membership.found] == [4, 0]
     assert r.outcome == "completed"
     assert compute(r)["lost_drones"] == 2.0
 
@@ -278,7 +280,7 @@ def test_thresholds_are_settings():
     flight = Flight(load_mission(mission("ideal", {"kind": "cable-cut"}, duration=3.5).resolved(),
                                  {"detection.speed": 10.0}))  # fmt: skip
     flight.run()
-    assert flight.found == []
+    assert flight.membership.found == []
     assert Residuals().params(colift.team.Team.uniform(3)).size == 13
 
 
@@ -473,7 +475,7 @@ def test_no_false_alarm_in_a_storm(n):
         storm |= {"drones.count": n, "truth.load_mass_factor": 1.0}
         flight = Flight(load_mission("real-world", storm))
         r = flight.run()
-        assert flight.found == []
+        assert flight.membership.found == []
         drones = r.mission.drones
         force = np.linalg.norm(r["external_forces"][:, :-1], axis=2).max()
         assert force > 0.6 * drones.mass * 9.81
@@ -496,6 +498,10 @@ def test_descent_is_smooth_starts_as_told_and_ends_at_rest():
         np.testing.assert_allclose(slope[2:-2], x[202:-2, order + 1], atol=2e-3)
 
 
+def cannot_carry(flight, rest):
+    return flight.membership.cannot_carry(rest, flight.drones, flight.bus, flight.parts)
+
+
 def too_heavy():
     """Three drones within the tension limit hold 0.225 kg, two do not."""
     limit = {"allocation.tension_max": 1.1, "drones.count": 3}
@@ -505,8 +511,8 @@ def too_heavy():
 def test_the_load_comes_down_when_the_rest_cannot_carry_it():
     flight = Flight(too_heavy())
     r = flight.run()
-    assert "tension_max" in flight.descent
-    assert r.outcome == flight.descent
+    assert "tension_max" in flight.membership.descent
+    assert r.outcome == flight.membership.descent
     assert r.outcome.startswith("descended from t = 3.")
     assert r["reference"][-1, 0, 2] == pytest.approx(Descent().height, abs=1e-6)
     assert (r["reference"][r.time > AT + 1.5, 1, 2] <= 1e-9).all()
@@ -520,7 +526,7 @@ def test_the_load_comes_down_when_the_rest_cannot_carry_it():
 
 def test_the_load_is_not_brought_down_while_the_rest_can():
     flight, r = fly("ideal", {"kind": "cable-cut"})
-    assert flight.descent == ""
+    assert flight.membership.descent == ""
     assert r.outcome == "completed"
 
 
@@ -529,12 +535,12 @@ def test_weak_motors_bring_it_down_too():
              "allocation.mu": 1.2}  # fmt: skip
     # Four would be refused before flight, for they have no reserve; in flight they hold it.
     flight = Flight(load_mission(mission("real", n=4).resolved(), heavy, must_fly=False))
-    assert flight._cannot_carry([0, 1, 2, 3]) == ""
-    assert "3 drones lift less than 0.7018 kg" in flight._cannot_carry([0, 1, 2])
+    assert cannot_carry(flight, [0, 1, 2, 3]) == ""
+    assert "3 drones lift less than 0.7018 kg" in cannot_carry(flight, [0, 1, 2])
     # With 1.95 N a motor they would lift 0.885 kg on vertical cables; 30 degrees apart they do not hold 0.88 kg.
     tilted = {**heavy, "load.mass": 0.88, "actuation.max_thrust": 1.95}
     flight = Flight(load_mission(mission("real", n=4).resolved(), tilted, must_fly=False))
-    found = flight._cannot_carry([0, 1, 2])
+    found = cannot_carry(flight, [0, 1, 2])
     assert "the drones' thrust (together 23.4 N) and min_angle_deg = 30" in found
 
 
@@ -547,6 +553,6 @@ def test_nobody_calls_the_allocator_to_ask_who_can_carry(monkeypatch):
         raise AssertionError("the allocator was called")
 
     monkeypatch.setattr(Allocator, "allocate", never)
-    assert "tension_max" in flight._cannot_carry([0, 1])
+    assert "tension_max" in cannot_carry(flight, [0, 1])
     flight.lose([2])
-    assert flight.descent
+    assert flight.membership.descent

@@ -11,14 +11,14 @@ from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from colift.control.allocation.base import AllocatorPart
-from colift.control.reference.descent import Descent
 from colift.errors import ColiftError, Problem, SettingError
 from colift.flight.leg import Leg, Stretch, due_rows, places_of
 from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
+from colift.flight.membership import Membership
 from colift.interrupts import heard
+from colift.kernel.ports import PORTS, hold, hold_answer
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
 from colift.mission.schema import Event
@@ -28,7 +28,6 @@ from colift.record.recording import Recording
 from colift.team import Team
 from colift.team.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.wording import numbers
-from colift.world.actuation.base import ActuationPart
 from colift.world.disturbance.base import DisturbancePart
 from colift.world.fault.base import LOAD, Change
 from colift.world.plant.base import Start
@@ -54,10 +53,8 @@ class Flight:
         Wall time spent in the loop so far, s.
     outcome : str
         ``"completed"``, or how the flight ended.
-    found : list of (time, drone)
-        Drones that were judged lost by the mission's ``detection``, s.
-    descent : str
-        Why the load is brought down because the drones left cannot carry it; empty while they can.
+    membership : Membership
+        What has become of the team.
 
     """
 
@@ -65,8 +62,7 @@ class Flight:
         self.mission = mission
         self.loop_time = 0.0
         self.outcome = "completed"
-        self.found: list[tuple[float, int]] = []
-        self.descent = ""
+        self.membership = Membership(mission.team)
         self._step = 0
         self._every = Periods(mission.timing.step, **mission.timing.multiples())
         self._keys = {layer: random_key(mission.seed, layer) for layer in LAYERS}
@@ -89,6 +85,13 @@ class Flight:
     def time(self) -> float:
         """Simulated time flown, s."""
         return self._step * self._every.step
+
+    @property
+    def clock(self) -> float:
+        """Time that the reference is given now, s: the flight's, unless a supervisor has held it."""
+        if self._step == 0:
+            return 0.0
+        return self.time + (float(self.bus.clock[0]) - (self._step - 1) * self._every.step)
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -173,6 +176,29 @@ class Flight:
             self.replace(section, _with(self.parts[section], section, name, value))
         else:
             raise ColiftError(f"{path}: there is no such setting")
+
+    def act(self, layer: str, **signals: ArrayLike) -> None:
+        """Set what a layer whose part is ``external`` writes, from now on: values by the name of the signal.
+
+        Raises
+        ------
+        ColiftError
+            If another part drives the layer, or it does not write such a signal.
+        SettingError
+            For a value of another shape, or one that is not finite.
+
+        """
+        part = self._parts.get(layer)
+        if part is None or getattr(type(part).kernel, "py_func", None) not in (hold, hold_answer):
+            raise ColiftError(f'{layer}: only a layer of kind "external" is driven from outside')
+        if unknown := {*signals} - {*PORTS[layer].writes}:
+            raise ColiftError(
+                f"{layer}: writes {', '.join(PORTS[layer].writes)}, not {', '.join(sorted(unknown))}"
+            )
+        places = {name: getattr(self.bus, name) for name in signals}
+        values = {name: numbers(name, value, places[name].shape) for name, value in signals.items()}
+        for name, value in values.items():
+            places[name][:] = value
 
     def replace(self, section: str, part: Part) -> None:
         """Put a part in place of that of a section (:attr:`parts`); one of the same kind goes on with its memory.
@@ -282,7 +308,9 @@ class Flight:
             * (every.allocation * every.step),
             arrays=arrays,
             provenance={"warnings": self.warnings} if self.warnings else {},
-            outcome=(self.descent or self.outcome) if self.outcome == "completed" else self.outcome,
+            outcome=(self.membership.descent or self.outcome)
+            if self.outcome == "completed"
+            else self.outcome,
         )
 
     @property
@@ -310,8 +338,7 @@ class Flight:
         return Snapshot(
             step=self._step,
             outcome=self.outcome,
-            found=tuple(self.found),
-            descent=self.descent,
+            membership=replace(self.membership, found=list(self.membership.found)),
             load_mass=self._load_mass,
             due=tuple(self._due),
             parts=dict(self._parts),
@@ -325,10 +352,9 @@ class Flight:
 
         Parts that keep something outside of their memory, as plain Python may, do not go back.
         """
-        self._step, self.outcome, self.descent = before.step, before.outcome, before.descent
-        self.found, self._due, self._load_mass = (
-            list(before.found), list(before.due), before.load_mass
-        )  # fmt: skip
+        self._step, self.outcome = before.step, before.outcome
+        self.membership = replace(before.membership, found=list(before.membership.found))
+        self._due, self._load_mass = list(before.due), before.load_mass
         self._parts, self._disturbances = dict(before.parts), dict(before.disturbances)
         self._legs = [leg for leg, _, _ in before.legs]
         for leg, begin, stretches in before.legs:
@@ -346,8 +372,7 @@ class Flight:
             if not np.isfinite(leg.bus.row).all():
                 self.outcome = f"diverged before t = {self.time:g} s"
             elif not leg.bus.carrying.all():
-                lost = [d for d, ok in zip(leg.drones, leg.bus.carrying, strict=True) if not ok]
-                self.found += [(self.time, drone) for drone in lost]
+                lost = self.membership.judged_lost(leg.drones, leg.bus.carrying, self.time)
                 if len(lost) < len(leg.drones):
                     self.lose(lost)
                 else:
@@ -355,24 +380,12 @@ class Flight:
 
     def lose(self, lost: list[int]) -> None:
         """Go on without these drones; if the others cannot hold the load in hover, bring it down."""
-        rest = [drone for drone in self.drones if drone not in lost]
-        if not self.descent and (reason := self._cannot_carry(rest)):
-            self.descent = f"descended from t = {self.time:g} s: {reason}"
-            position, velocity = self.bus.reference[:2].tolist()
-            self._parts["reference"] = Descent(position=position, velocity=velocity, at=self.time)
+        drones, time = self.drones, self.time
+        rest = [drone for drone in drones if drone not in lost]
+        self._parts |= self.membership.left_with(
+            rest, drones, self.bus, self._parts, time=time, clock=self.clock
+        )
         self.regroup(rest)
-
-    def _cannot_carry(self, drones: list[int]) -> str:
-        """Why these drones cannot carry the load on; empty when they can, as far as their models say."""
-        bus, team = self.bus, self.mission.team.of(drones)
-        actuation = self._parts["actuation"].of(drones)
-        allocation = self._parts["allocation"].of(drones)
-        assert isinstance(actuation, ActuationPart)
-        assert isinstance(allocation, AllocatorPart)
-        directions = bus.desired_directions[[self.drones.index(drone) for drone in drones]]
-        problems = [message for _, message in actuation.conflicts(team)]
-        problems += allocation.cannot_hold(team, actuation.thrust_limits(team), directions)
-        return "; ".join(problems)
 
     def _advance(self, stop: int) -> None:
         """Run the loop up to a step, or until it ends early; keep what it recorded."""
@@ -402,10 +415,10 @@ class Flight:
             elif due.drone is not None:
                 return
             np.copyto(signal, value, where=~np.isnan(value))
-        elif due.field == "drones.lose":
+        elif due.of_team == "lose":
             if due.value in drones and len(drones) > 1:
                 self.lose([due.value])
-        elif due.field == "drones.join":
+        elif due.of_team == "join":
             self.regroup(sorted([*drones, due.value]))
         else:
             self.change(due.field, due.value)
@@ -442,8 +455,7 @@ class Snapshot(NamedTuple):
 
     step: int
     outcome: str
-    found: tuple[tuple[float, int], ...]
-    descent: str
+    membership: Membership
     load_mass: float
     due: tuple[tuple[int, Event | Change], ...]
     parts: dict[str, Part]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.flight.loop import CYCLE_WIDTH, Circuit, Periods
+from colift.kernel.signals import HIDDEN
 from colift.team import Team
 
 
@@ -59,7 +60,8 @@ class Leg:
         """All that the loop changes in this leg, and all that may be changed from outside."""
         wires = (*self.circuit.wires, *self.circuit.disturbances)
         vectors = [each for wire in wires for each in (wire.params, wire.memory)]
-        return [self.bus.row, self.bus.allocator_info, *vectors]
+        hidden = (getattr(self.bus, signal.name) for signal in HIDDEN)
+        return [self.bus.row, *hidden, *vectors]
 
 
 def due_rows(first: int, stop: int, period: int) -> int:

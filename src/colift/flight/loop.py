@@ -1,8 +1,8 @@
 """The paper's block diagram, and the world around it, as one loop over physics steps (paper fig. 2).
 
-    reference -> load control -> allocation -> link -> position control -> attitude control
-        ^                                                                        |
-    estimation <- sensing <- plant <- disturbances, actuation  <-----------------+
+    supervision -> reference -> load control -> allocation -> link -> position control -> attitude control
+        ^                                                                                   |
+    estimation <- sensing <- plant <- disturbances, actuation  <----------------------------+
 
 The loop is compiled when every part is, and runs as plain Python otherwise: same code, `advance` or
 `advance.py_func`.
@@ -42,7 +42,7 @@ Common = named_tuple(
     "Common",
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
-        "peak_tensions", "catch_impulses", "carrying",
+        "peak_tensions", "catch_impulses", "carrying", "clock", "reference",
     ],
     __name__,
 )  # fmt: skip
@@ -70,7 +70,10 @@ SIGNATURE = i8(
     named([PORTS[name].type for name in Wires._fields], Wires),
     i8,
     types.UniTuple(PORTS["disturbance"].type, MAX_DISTURBANCES),
-    named([matrix if name == "external_forces" else vector for name in Common._fields], Common),
+    named(
+        [matrix if name in {"external_forces", "reference"} else vector for name in Common._fields],
+        Common,
+    ),
     matrix,
     matrix,
 )
@@ -78,6 +81,7 @@ SIGNATURE = i8(
 # Compiled code knows functions by the names of this file.
 _observe, _step = PORTS["plant_observe"].invoke, PORTS["plant"].invoke
 _sense, _estimate = PORTS["sensing"].invoke, PORTS["estimation"].invoke
+_supervise = PORTS["supervision"].invoke
 _refer, _control_load = PORTS["reference"].invoke, PORTS["load_control"].invoke
 _allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
 _control_position = PORTS["position_control"].invoke
@@ -102,7 +106,14 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
         _observe(wires.plant_observe, k, t, dt)
         _sense(wires.sensing, k, t, dt)
         _estimate(wires.estimation, k, t, dt)
-        _refer(wires.reference, k, t, dt)
+        _supervise(wires.supervision, k, t, dt)
+        _refer(wires.reference, k, bus.clock[0], dt)
+        if bus.clock[1] != 1.0:  # from derivatives along the clock to those in time
+            rate = 1.0
+            for m in range(1, 4):
+                rate *= bus.clock[1]
+                for j in range(3):
+                    bus.reference[m, j] *= rate
 
         if k % every.load_control == 0:
             _control_load(wires.load_control, k, t, every.load_control * dt)

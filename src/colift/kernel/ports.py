@@ -25,8 +25,8 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from colift.kernel.jit import address_of, f8, i8, matrix, vector, void
-from colift.kernel.signals import ANSWER, LEGEND, Signal, named_tuple
+from colift.kernel.jit import address_of, f8, i8, matrix, tensor, vector, void
+from colift.kernel.signals import HIDDEN, LEGEND, Signal, named_tuple
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def named(each: Iterable[Any], made: Any) -> Any:
 
 NOW_TYPE = named([i8, f8, f8, i8], Now)
 
-_SIGNALS: dict[str, Signal] = {**LEGEND, ANSWER.name: ANSWER}
+_SIGNALS: dict[str, Signal] = {**LEGEND, **{signal.name: signal for signal in HIDDEN}}
 
 
 def _words(name: str) -> str:
@@ -83,8 +83,8 @@ def _tuple(name: str, signals: Iterable[str]) -> Any:
 
 
 def _type(made: Any) -> Any:
-    arrays = [vector if len(_SIGNALS[name].shape) == 1 else matrix for name in made._fields]
-    return named(arrays, made)
+    arrays = (vector, matrix, tensor)
+    return named((arrays[len(_SIGNALS[name].shape) - 1] for name in made._fields), made)
 
 
 def _invoke(signature: Any) -> Callable[[Wire, int, float, float], Any]:
@@ -201,24 +201,29 @@ _RECEIVED = ("received_tensions", "received_directions")
 PORTS: dict[str, Port] = {
     port.name: port
     for port in (
-        Port("reference", sees=(), writes=("reference",)),
         Port("sensing", sees=(*_TRUE.split(), "stuck"), writes=_named("measured")),
         Port(
             "estimation",
             sees=(*_named("measured"), "thrusts", *_RECEIVED),
             writes=_named("estimated"),
         ),
+        Port(
+            "supervision",
+            sees=(*_named("estimated"), "thrusts", *_RECEIVED),
+            writes=("phase", "clock"),
+        ),
+        Port("reference", sees=(), writes=("reference", "nominal_forces")),
         Port("load_control", sees=("estimated_load", "reference"), writes=("force",)),
         Port(
             "allocation",
-            sees=("force", "reference"),
+            sees=("force", "reference", "nominal_forces"),
             writes=("desired_tensions", "desired_directions", "allocator_info"),
             answers=True,
         ),
         Port("link", sees=("desired_tensions", "desired_directions"), writes=_RECEIVED),
         Port(
             "position_control",
-            sees=(*_named("estimated")[1:], "reference", *_RECEIVED),
+            sees=(*_named("estimated")[1:], "reference", "nominal_forces", *_RECEIVED),
             writes=("drone_forces", "thrusts", "desired_attitudes", "desired_rates"),
         ),
         Port(
@@ -257,3 +262,12 @@ PORTS: dict[str, Port] = {
 
 MAX_DISTURBANCES = 8
 """Most disturbances in one mission: so many places the compiled loop has for them."""
+
+
+def hold(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    """A kernel of a layer that is driven from outside: what it writes stays what it was set to."""
+
+
+def hold_answer(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    """The same for a layer that answers with a status."""
+    return 0

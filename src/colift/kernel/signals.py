@@ -86,6 +86,8 @@ SIGNALS = (
     Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives", initial=1.0),
     Signal("stuck", ("n+1",), "1", "-", "-", "1 where the sensors of a drone or, last, the load repeat their last value"),
     Signal("allocator_up", (1,), "1", "-", "-", "1 where the allocator answers, 0 where it is silent", initial=1.0),
+    Signal("phase", (1,), "1", "-", "-", "what the supervisor is about; 0 is flying"),
+    Signal("clock", (2,), "s, 1", "-", "-", "time that the reference is given, and how fast it runs: 1 as time does, 0 held", initial=0.0),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 
@@ -101,6 +103,20 @@ ANSWER = Signal(
     "what an allocator says of its answer: the middle ones of CYCLE_SIGNALS",
 )
 """Not recorded as such."""
+
+NOMINAL = Signal(
+    "nominal_forces",
+    ("n", 3, 3),
+    "N, N/s, N/s^2",
+    "T_i alpha_i",
+    "world",
+    "planned pull of each cable on its drone and two derivatives; not numbers where nothing is planned",
+    initial=np.nan,
+)
+"""Not recorded: what follows a plan has it on file."""
+
+HIDDEN = (ANSWER, NOMINAL)
+"""Signals of the bus that stand outside of its row."""
 
 CYCLE_SIGNALS = tuple(
     replace(signal, each="allocation")
@@ -121,8 +137,8 @@ LEGEND = {signal.name: signal for signal in (*SIGNALS, *CYCLE_SIGNALS)}
 """All that are recorded, by name."""
 
 
-Bus = named_tuple("Bus", ["row", ANSWER.name, *(signal.name for signal in SIGNALS)], __name__)
-"""The bus row, its views, one per recorded signal, and what an allocator says of its answer."""
+Bus = named_tuple("Bus", ["row", *(signal.name for signal in (*HIDDEN, *SIGNALS))], __name__)
+"""The bus row, the signals that stand outside of it, and its views, one per recorded signal."""
 
 
 def columns(n: int) -> dict[str, slice]:
@@ -140,7 +156,7 @@ def make_bus(n: int) -> Any:
     where = columns(n)
     row = np.zeros(max(part.stop for part in where.values()))
     views = {s.name: row[where[s.name]].reshape(s.shape_for(n)) for s in SIGNALS}
-    for s in SIGNALS:
+    views |= {s.name: np.empty(s.shape_for(n)) for s in HIDDEN}
+    for s in (*HIDDEN, *SIGNALS):
         views[s.name][:] = s.initial
-    views[ANSWER.name] = np.zeros(ANSWER.shape_for(n))
     return Bus(row=row, **views)

@@ -168,14 +168,14 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
     """Mistakes in the events, in the order in which they happen."""
     n, timing, present = frame.drones.count, frame.timing, dict(parts)
     left = set(range(n))
-    if all(type(e.value) is int for e in frame.events if e.field.startswith("drones.")):
+    if all(type(e.value) is int for e in frame.events if e.of_team):
         left = set(frame.first_drones())
     for i, event in sorted(enumerate(frame.events), key=lambda pair: pair[1].at):
         if "timing" not in broken and event.at > timing.duration:
             message = f"must be within timing.duration = {timing.duration:g} s"
             yield Problem(f"events.{i}.at", f"{event.at:g}", message)
         section, _, name = event.field.rpartition(".")
-        if section == "drones":
+        if event.of_team:
             if "drones" not in broken:
                 yield from _team_change(f"events.{i}.value", name, event.value, left, n)
         elif section == "load":

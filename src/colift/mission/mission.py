@@ -13,6 +13,7 @@ from colift.control.estimation.base import EstimationPart
 from colift.control.load_control.base import LoadControlPart
 from colift.control.position_control.base import PositionControlPart
 from colift.control.reference.base import ReferencePart
+from colift.control.supervision.base import SupervisionPart
 from colift.mission.schema import Described
 from colift.part import LISTS
 from colift.world.actuation.base import ActuationPart
@@ -37,6 +38,7 @@ class Mission(Described):
     reference: SerializeAsAny[ReferencePart]
     sensing: SerializeAsAny[SensingPart]
     estimation: SerializeAsAny[EstimationPart]
+    supervision: SerializeAsAny[SupervisionPart]
     load_control: SerializeAsAny[LoadControlPart]
     allocation: SerializeAsAny[AllocatorPart]
     link: SerializeAsAny[LinkPart]

@@ -201,6 +201,12 @@ class Event(Section):
     cut and that leaves the team, which is told at once; for ``drones.join`` the drone that hooks in then, in
     the widest gap between the cables, at the load's velocity, and that is not there before."""
 
+    @property
+    def of_team(self) -> str:
+        """``"lose"`` or ``"join"`` where the drone ``value`` leaves or joins; empty for other changes."""
+        section, _, name = self.field.rpartition(".")
+        return name if section == "drones" else ""
+
 
 class Bound(Section):
     """What a number must keep within for the flight to pass; one end may be left open."""
@@ -277,9 +283,9 @@ class Frame(Section):
         """Numbers of the drones that fly from the start: all but those that join before they leave."""
         first: dict[int, str] = {}
         for event in sorted(self.events, key=lambda event: event.at):
-            if event.field.startswith("drones."):
-                first.setdefault(event.value, event.field)
-        return [i for i in range(self.drones.count) if first.get(i) != "drones.join"]
+            if event.of_team:
+                first.setdefault(event.value, event.of_team)
+        return [i for i in range(self.drones.count) if first.get(i) != "join"]
 
     def start_directions(self) -> Array:
         """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""

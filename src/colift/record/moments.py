@@ -343,13 +343,13 @@ def _coming_and_going(
     events, commanded = recording.mission.events, _commanded(recording)
     for row, drone in np.argwhere(present[1:] != present[:-1]).tolist():
         time = float(recording.time[row])
-        field = "drones.join" if present[row + 1, drone] else "drones.lose"
+        change = "join" if present[row + 1, drone] else "lose"
         since = recording.time[row - 1] if row else -np.inf
         asked = [
             k for k, event in enumerate(events)
-            if event.field == field and event.value == drone and since < event.at <= time + 1e-9
+            if event.of_team == change and event.value == drone and since < event.at <= time + 1e-9
         ]  # fmt: skip
-        if field == "drones.join":
+        if change == "join":
             yield Moment(
                 events[asked[0]].at if asked else time, "join", f"Drone {drone} joins", drone
             )
@@ -382,7 +382,7 @@ def _changes(recording: Recording, after: float) -> Iterator[Moment]:
     """What the mission asked for, later than a time; drones that come and go are seen in the signals."""
     commanded = _commanded(recording)
     for k, event in enumerate(recording.mission.events):
-        asked = k not in commanded and not event.field.startswith("drones.")
+        asked = k not in commanded and not event.of_team
         if asked and after < event.at <= recording.time[-1]:
             yield Moment(event.at, "change", _asked(event))
 

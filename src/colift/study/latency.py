@@ -26,7 +26,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numba import types
 
-from colift.control.allocation.base import INFO_ITERATIONS, INFO_SIZE, Allocator, AllocatorPart, ask
+from colift.control.allocation.base import (
+    INFO_ITERATIONS,
+    INFO_SIZE,
+    Allocator,
+    AllocatorPart,
+    ask,
+    unplanned,
+)
 from colift.control.allocation.safe import Safe
 from colift.control.allocation.sqp import Sqp
 from colift.errors import ColiftError
@@ -86,6 +93,7 @@ def _tick(  # type: ignore[no-untyped-def]
     allocate, forces, dt, period, params, memory, tensions, directions, info, rest, out
 ):
     """One call per tick, ``period`` ns apart; a row of ``out``: late, 0, own, away (ns), iterations."""
+    nominal = unplanned(tensions.shape[0])
     tick = monotonic_ns()
     for k in range(forces.shape[0]):
         tick += period
@@ -95,7 +103,7 @@ def _tick(  # type: ignore[no-untyped-def]
         while monotonic_ns() < tick:
             pass
         begin, cpu = monotonic_ns(), thread_time_ns()
-        ask(allocate, forces[k], rest, dt, params, memory, tensions, directions, info)
+        ask(allocate, forces[k], rest, nominal, dt, params, memory, tensions, directions, info)
         own = thread_time_ns() - cpu
         wall = monotonic_ns() - begin
         out[k, 0] = begin - tick

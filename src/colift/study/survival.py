@@ -133,12 +133,12 @@ def fly(case: Case) -> Survival:
     flight = Flight(case.mission)
     recording = flight.run()
     values = metrics.compute(recording)
-    own = [when - case.at for when, drone in flight.found if drone == case.drone]
+    own = [when - case.at for when, drone in flight.membership.found if drone == case.drone]
     return Survival(
         case=case,
         outcome=recording.outcome,
         delay=own[0] if own else float("nan"),
-        innocent=len(flight.found) - len(own),
+        innocent=len(flight.membership.found) - len(own),
         error=_error_after(recording, case.at + CALM),
         angle=values["min_angle_deg"],
         height=values["min_height_m"],

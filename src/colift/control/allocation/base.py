@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from colift.errors import Problem, SettingError
-from colift.kernel.jit import address_of, f8, i8, inline, kernel, matrix, vector
+from colift.kernel.jit import address_of, f8, i8, inline, kernel, matrix, tensor, vector
 from colift.kernel.ports import PORTS, Wire
 from colift.kernel.status import Status as Status
 from colift.part import Part, Setup, Vector
@@ -35,16 +35,22 @@ _invoke = PORTS["allocation"].invoke
 
 
 @inline
-def ask(address, force, reference, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
     """Call an allocator's kernel, from compiled code of studies and benchmarks, by its address."""
-    sees, writes = _Sees(force, reference), _Writes(tensions, directions, info)
+    sees, writes = _Sees(force, reference, nominal), _Writes(tensions, directions, info)
     return _invoke(Wire(address, 0, params, memory, sees, writes), 0, 0.0, dt)
 
 
-@kernel(i8(i8, vector, matrix, f8, vector, vector, vector, matrix, vector))
-def _ask(address, force, reference, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+@inline
+def unplanned(n):  # type: ignore[no-untyped-def]
+    """No nominal forces (n, 3, 3): nothing is planned."""
+    return np.full((n, 3, 3), np.nan)
+
+
+@kernel(i8(i8, vector, matrix, tensor, f8, vector, vector, vector, matrix, vector))
+def _ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
     """:func:`ask` from Python, to which plain arrays are quicker than named tuples of them."""
-    return ask(address, force, reference, dt, params, memory, tensions, directions, info)
+    return ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info)
 
 
 INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
@@ -274,6 +280,7 @@ class Allocator:
         self._team = self._whole.of(self._drones)
         self._tensions = np.zeros(self.n)
         self._directions = np.zeros((self.n, 3))
+        self._nominal = np.full((self.n, 3, 3), np.nan)
         self._params = self.part.of(self._drones).params(self._team)
         self._memory = self.part.of(self._drones).memory(self._team)
 
@@ -433,6 +440,7 @@ class Allocator:
             self._function,
             self._force,
             self._reference,
+            self._nominal,
             period,
             self._params,
             self._memory,

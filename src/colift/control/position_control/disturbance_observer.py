@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from colift.control.position_control._aim import AIM, aim
+from colift.control.position_control._cable import CABLE, lead
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays
 from colift.kernel.jit import inline, kernel
@@ -16,7 +17,6 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.small import solve_symmetric
 from colift.kernel.math.smooth import decay
-from colift.kernel.math.sphere import FOLLOW, follow
 from colift.part import Setup, Vector
 from colift.team import Team
 
@@ -31,7 +31,7 @@ PARAMS = Layout(
 """Bandwidths of velocity, position and observer (1/s); forces over weight; tangent of the tilt."""
 MEMORY = Layout(
     drone={
-        "started": 1, "direction": FOLLOW, "aim": AIM, "momentum": 3, "force": 3, "wind": 3,
+        "started": 1, "direction": CABLE, "aim": AIM, "momentum": 3, "force": 3, "wind": 3,
         "thrust": 1,
     }
 )  # fmt: skip
@@ -120,7 +120,7 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
                 memory[o + M.direction + k] = alpha[i, k]
         L = params[P.rows + P.width * i + P.L]
         reach = params[P.max_swing] / (omega * omega * L)
-        follow(memory, o + M.direction, alpha[i, 0], alpha[i, 1], alpha[i, 2], omega, dt, reach)
+        lead(i, alpha, sees.nominal_forces, omega, dt, memory, o + M.direction, reach)
         _observe(i, v, params, memory, o)
     wind = _common_wind(n, params, memory)
     for i in range(n):

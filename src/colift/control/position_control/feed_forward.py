@@ -8,11 +8,11 @@ from typing import Annotated
 from pydantic import Field
 
 from colift.control.position_control._aim import AIM, aim
+from colift.control.position_control._cable import CABLE, lead
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.smooth import decay
-from colift.kernel.math.sphere import FOLLOW, follow
 from colift.part import Vector
 from colift.team import Team
 
@@ -22,7 +22,7 @@ PARAMS = Layout(
     team={"g": 1, "k_p": 3, "k_d": 3, "k_i": 3, "limit": 1, "frequency": 1, "thrust_filter": 1},
     drone={"m": 1, "L": 1},
 )
-MEMORY = Layout(drone={"started": 1, "integral": 3, "alpha": FOLLOW, "aim": AIM})
+MEMORY = Layout(drone={"started": 1, "integral": 3, "alpha": CABLE, "aim": AIM})
 P, M = PARAMS.at, MEMORY.at
 
 
@@ -45,7 +45,7 @@ def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped
         if fresh:
             for k in range(3):
                 memory[a + k] = alpha[i, k]
-        follow(memory, a, alpha[i, 0], alpha[i, 1], alpha[i, 2], params[P.frequency], dt)
+        lead(i, alpha, sees.nominal_forces, params[P.frequency], dt, memory, a, math.pi)
         norm = 0.0
         for k in range(3):
             # The drone's place, velocity and acceleration at the end of the filtered cable.

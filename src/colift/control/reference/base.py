@@ -25,9 +25,10 @@ class ReferencePart(Part):
 
     def sample(self, times: Vector, team: Team | None = None) -> Vector:
         """Reference at the given times: (len(times), 4, 3)."""
-        port, params = PORTS["reference"], self.params(team or Team.uniform(1))
-        out = np.zeros((len(times), 4, 3))
+        team = team or Team.uniform(1)
+        port, params = PORTS["reference"], self.params(team)
+        signals, out = port.signals(team.n), np.zeros((len(times), 4, 3))
         for row, t in zip(out, times, strict=True):
-            wire = port.wire(type(self).kernel, params, np.zeros(0), {"reference": row})
+            wire = port.wire(type(self).kernel, params, np.zeros(0), signals | {"reference": row})
             port.invoke(wire, 0, float(t), 0.0)
         return out

@@ -338,7 +338,7 @@ class Session:
         found: list[Moment] = []
         if flight.time - self._watch.seen >= WATCH_PERIOD or flight.outcome != "completed":
             recent = flight.recording(since=self._watch.seen)
-            found = self._watch.look(recent, [drone for _, drone in flight.found])
+            found = self._watch.look(recent, [drone for _, drone in flight.membership.found])
         if self._pending and flight.time - self._pending[1] > ONE_COMMAND:
             self._flush()
         with self._lock:
@@ -393,9 +393,9 @@ class Session:
         return part if isinstance(part, Guided) else Guided()
 
     def _guide(self, part: Guided, text: str) -> None:
-        if self.flight.descent:
+        if self.flight.membership.descent:
             raise ColiftError(
-                f"the load is brought down ({self.flight.descent}); reset to fly again"
+                f"the load is brought down ({self.flight.membership.descent}); reset to fly again"
             )
         self._change(
             "reference", {"kind": "guided", **part.model_dump(mode="json", exclude_none=True)}, text

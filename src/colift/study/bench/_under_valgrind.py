@@ -14,7 +14,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from colift.control.allocation.base import INFO_SIZE, ask
+from colift.control.allocation.base import INFO_SIZE, ask, unplanned
 from colift.kernel.jit import address_of, f8, i8, kernel, matrix, vector, void
 from colift.study.bench.instructions import CALLS, WARM_UP, cases
 from colift.study.bench.problems import Problem
@@ -58,11 +58,12 @@ def _counted(  # type: ignore[no-untyped-def]
     allocate, forces, dt, params, memory, tensions, directions, info, rest
 ):
     """Call an allocator once per force; the calls after ``WARM_UP`` make one dump of callgrind."""
+    nominal = unplanned(tensions.shape[0])
     for k in range(forces.shape[0]):
         if k == WARM_UP:
             _start()
             _zero()
-        ask(allocate, forces[k], rest, dt, params, memory, tensions, directions, info)
+        ask(allocate, forces[k], rest, nominal, dt, params, memory, tensions, directions, info)
     _dump()
     _stop()
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.control.allocation.base import INFO_SIZE, AllocatorPart, ask
+from colift.control.allocation.base import INFO_SIZE, AllocatorPart, ask, unplanned
 from colift.kernel.jit import (
     address_of,
     f8,
@@ -65,10 +65,13 @@ def _time_calls(  # type: ignore[no-untyped-def]
     A row of ``out``: wall time (ns), iterations, status, tensions (n), directions (3n).
     """
     n = tensions.shape[0]
+    nominal = unplanned(n)
     cpu = thread_time_ns()
     for k in range(forces.shape[0]):
         begin = monotonic_ns()
-        status = ask(allocate, forces[k], rest, dt, params, memory, tensions, directions, info)
+        status = ask(
+            allocate, forces[k], rest, nominal, dt, params, memory, tensions, directions, info
+        )
         out[k, 0] = monotonic_ns() - begin
         out[k, 1] = info[0]
         out[k, 2] = status

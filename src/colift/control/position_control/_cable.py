@@ -1,0 +1,48 @@
+"""Direction of the cable that a drone holds, with its rate and acceleration: planned motion as it is, corrections filtered."""
+
+from __future__ import annotations
+
+import math
+
+from colift.kernel.jit import inline
+from colift.kernel.math.sphere import FOLLOW, follow
+
+CABLE = FOLLOW + 6
+"""Numbers that it remembers of a cable: direction, rate and acceleration, then the correction and its rate."""
+
+
+@inline
+def lead(i, alpha, nominal, omega, dt, memory, o, reach):  # type: ignore[no-untyped-def]
+    """Lead the cable of drone i towards ``alpha[i]``: direction, rate and acceleration in ``memory[o : o + 9]``.
+
+    ``omega`` (rad/s) and ``reach`` (rad) are those of :func:`colift.kernel.math.sphere.follow`.
+
+    Where ``nominal[i]`` (3, 3) gives the planned pull and its derivatives, that motion passes unfiltered, and only what
+    ``alpha`` differs by from it goes through a critically damped filter of the frequency ``omega``.
+    """
+    if math.isnan(nominal[i, 0, 0]):
+        follow(memory, o, alpha[i, 0], alpha[i, 1], alpha[i, 2], omega, dt, reach)
+        return
+    T = T1 = T2 = 0.0
+    for k in range(3):
+        T += nominal[i, 0, k] * nominal[i, 0, k]
+    T = math.sqrt(max(T, 1e-18))
+    for k in range(3):
+        T1 += nominal[i, 0, k] / T * nominal[i, 1, k]
+    for k in range(3):
+        rate = (nominal[i, 1, k] - nominal[i, 0, k] / T * T1) / T
+        T2 += rate * nominal[i, 1, k] + nominal[i, 0, k] / T * nominal[i, 2, k]
+    damp = 1.0 / (1.0 + 2.0 * omega * dt)
+    c = o + FOLLOW
+    for k in range(3):
+        direction = nominal[i, 0, k] / T
+        rate = (nominal[i, 1, k] - direction * T1) / T
+        turning = (nominal[i, 2, k] - direction * T2 - 2.0 * rate * T1) / T
+        before = memory[c + 3 + k]
+        off = alpha[i, k] - direction - memory[c + k]
+        speed = (before + dt * omega * omega * off) * damp
+        memory[c + 3 + k] = speed
+        memory[c + k] += dt * speed
+        memory[o + k] = direction + memory[c + k]
+        memory[o + 3 + k] = rate + speed
+        memory[o + 6 + k] = turning + (speed - before) / dt

@@ -1,0 +1,1 @@
+"""Supervision: what the flight is about now, and the clock that it goes by."""
