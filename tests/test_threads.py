@@ -98,7 +98,7 @@ from importlib import import_module
 from pathlib import Path
 from colift.kernel import jit
 before = jit.config.CACHE_DIR
-names = ["reference.hover", "allocation.sqp", "link.radio", "disturbance.gust", "sensing.noisy", "math.noise"]
+names = ["control.reference.hover", "control.allocation.sqp", "world.link.radio", "world.disturbance.gust", "world.sensing.noisy", "kernel.math.noise"]
 start = threading.Barrier(len(names))
 def load(name):
     start.wait()
@@ -119,4 +119,4 @@ for name in names:
         [sys.executable, "-c", script], text=True, capture_output=True, timeout=600
     )
     assert flown.returncode == 0, flown.stderr
-    assert {"link.radio", "allocation.sqp"} <= set(flown.stdout.split())
+    assert {"world.link.radio", "control.allocation.sqp"} <= set(flown.stdout.split())

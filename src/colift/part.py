@@ -290,6 +290,11 @@ def home(layer: str) -> str:
     return f"colift.{catalogue.WINGS[layer]}.{layer}"
 
 
+def answering(layer: str) -> list[str]:
+    """Names of the parts that answer by themselves: all but the one that is driven from outside."""
+    return [name for name in names(layer) if name != "external"]
+
+
 def find(layer: str, kind: str) -> type[Part]:
     """The class behind ``kind`` in ``layer``: registered, our own file's, or another package's."""
     if (layer, kind) in _registered:

@@ -17,7 +17,7 @@ from colift.kernel.jit import JIT_ENABLED, address_of
 from colift.team import Team
 from colift.team.geometry import ring
 
-KINDS = part.names("allocation")
+KINDS = part.answering("allocation")
 SIZES = (1, 2, 3, 4, 7, 16)
 GOOD = np.array([0.1, -0.2, 2.2])
 DENORMAL = 5e-324

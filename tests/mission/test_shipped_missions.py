@@ -95,7 +95,7 @@ def _short(mission):
 
 def test_a_mission_can_be_given_as_name_path_mapping_or_mission():
     mission = load_mission("hover", {"timing.duration": 0.1})
-    path = Path(colift.__file__).parent / "missions" / "hover.toml"
+    path = Path(colift.__file__).parent / "mission" / "shipped" / "hover.toml"
     runs = [
         colift.run(source, timing__duration=0.1, seed=3)
         for source in ("hover", path, str(path), mission, mission.resolved())

@@ -8,7 +8,7 @@ import pytest
 import colift
 from colift.flight import flight as flight_module
 from colift.flight.flight import Flight, start_state
-from colift.kernel.signals import SIGNALS, columns, make_bus
+from colift.kernel.signals import HIDDEN, SIGNALS, columns, make_bus
 from colift.mission import load_mission
 
 G = 9.81
@@ -278,5 +278,5 @@ def test_bus_holds_every_signal_once(n):
         view[...] = k
         assert (bus.row[where[signal.name]] == k).all()
     assert (covered == 1).all()
-    names = ["row", "allocator_info", *(signal.name for signal in SIGNALS)]
+    names = ["row", *(signal.name for signal in (*HIDDEN, *SIGNALS))]
     assert list(bus._fields) == names

@@ -121,7 +121,8 @@ class TestEveryPart:
         recording = Flight(mission_with(layer, name, **{"timing.duration": 0.3})).run()
         assert recording.outcome == "completed"
         error = np.linalg.norm(recording["load"][:, 0] - recording["reference"][:, 0], axis=1)
-        assert error.max() < 0.05
+        if name != "external":  # nobody drives it here
+            assert error.max() < 0.05
 
     @needs_jit
     def test_allocates_nothing_in_the_loop(self, layer, name):

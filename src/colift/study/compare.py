@@ -9,7 +9,7 @@ from colift.errors import ColiftError
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
 from colift.mission.schema import Bound
-from colift.part import find, names
+from colift.part import answering, find
 from colift.record.verdict import criteria_of
 from colift.study.campaign.plan import HEADING, OFFSET, Case, Source, without_seed
 
@@ -37,7 +37,7 @@ def contestants(
     ``wanted`` None stands for all; ``own`` are always among them.
     """
     able, missing = [], []
-    for name in dict.fromkeys([*(names("allocation") if wanted is None else wanted), *own]):
+    for name in dict.fromkeys([*(answering("allocation") if wanted is None else wanted), *own]):
         why = find("allocation", name).missing()
         if not why:
             able.append(name)

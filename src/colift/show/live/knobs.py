@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from colift.flight.flight import Flight
-from colift.part import Part, find, names
+from colift.part import Part, answering, find
 from colift.team import Team
 from colift.world.disturbance.base import DisturbancePart
 
@@ -94,7 +94,7 @@ def conflicts(flight: Flight, name: str, value: Any) -> list[tuple[str, str]]:
 def allocators(team: Team) -> list[str]:
     """Names of the allocators that this team can fly with, with their default settings."""
     found = []
-    for name in names("allocation"):
+    for name in answering("allocation"):
         part = find("allocation", name)
         if not part.missing() and not [*(made := part()).check(team), *made.conflicts(team)]:
             found.append(name)

@@ -29,7 +29,7 @@ from pydantic import ValidationError
 from colift.control.allocation.base import Allocator, AllocatorPart, Status
 from colift.errors import ColiftError, MissionError, Problem
 from colift.flight.flight import Progress
-from colift.part import find, names
+from colift.part import answering, find
 from colift.record.importing import Assumed, import_flight
 from colift.record.metrics import mean
 from colift.record.recording import Recording
@@ -177,7 +177,7 @@ def open_flight(path: Path, assumed: Assumed | None = None) -> Recording:
 
 def choose(wanted: Sequence[str] | None = None) -> tuple[list[str], dict[str, str]]:
     """The allocators that can be asked, and why the others of ``wanted`` (default: all) cannot."""
-    kinds = list(wanted) if wanted is not None else names("allocation")
+    kinds = list(wanted) if wanted is not None else answering("allocation")
     missing = {kind: find("allocation", kind).missing() for kind in kinds}
     usable = [kind for kind in kinds if not missing[kind]]
     return usable, {kind: why for kind, why in missing.items() if why}
