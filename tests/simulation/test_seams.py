@@ -98,7 +98,7 @@ class Planned(AllocatorPart):
     """Gives what is planned, whether it was told the plan or knows it by heart."""
 
     @staticmethod
-    def kernel(now, sees, params, memory, writes):
+    def kernel(now, sees, params, memory, writes):  # noqa: ARG004
         n = len(writes.desired_tensions)
         told = not np.isnan(sees.nominal_forces).any()
         pulls = sees.nominal_forces[:, 0] if told else _pulls(now.time, n)[:, 0]
@@ -117,7 +117,7 @@ class Still(ReferencePart):
     tells: bool = True
 
     @staticmethod
-    def kernel(now, sees, params, memory, writes):
+    def kernel(now, sees, params, memory, writes):  # noqa: ARG004
         writes.reference[:] = 0.0
         writes.reference[0, 2] = 2.0
         if params[0]:
