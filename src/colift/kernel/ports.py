@@ -10,7 +10,7 @@ and frames are those of the signals (:data:`colift.kernel.signals.SIGNALS`). Wha
 entry, what it wrote last.
 
 A layer that is to see one more signal gets its name in :data:`PORTS`: one line, and no kernel that does not
-use it changes.
+use it changes. What a layer writes is said by the table of signals: each line names its one writer.
 """
 
 from __future__ import annotations
@@ -130,8 +130,10 @@ class Port:
     ----------
     name : str
         Of the layer; for its second function, ``layer_function``.
-    sees, writes : tuple of str
+    sees : tuple of str
         Names of signals.
+    writes : tuple of str
+        Names of the signals of which it is the writer, in the order of their table.
     answers : bool
         Whether the kernel returns a status.
     signature : Numba signature
@@ -143,8 +145,8 @@ class Port:
 
     name: str
     sees: tuple[str, ...]
-    writes: tuple[str, ...]
     answers: bool = False
+    writes: tuple[str, ...] = field(init=False)
     Sees: Any = field(init=False, repr=False)
     Writes: Any = field(init=False, repr=False)
     signature: Any = field(init=False, repr=False)
@@ -152,6 +154,7 @@ class Port:
 
     def __post_init__(self) -> None:
         keep = object.__setattr__
+        keep(self, "writes", tuple(s.name for s in _SIGNALS.values() if s.writer == self.name))
         keep(self, "Sees", _tuple(f"{_words(self.name)}Sees", self.sees))
         keep(self, "Writes", _tuple(f"{_words(self.name)}Writes", self.writes))
         returns = i8 if self.answers else void
@@ -201,59 +204,31 @@ _RECEIVED = ("received_tensions", "received_directions")
 PORTS: dict[str, Port] = {
     port.name: port
     for port in (
-        Port("sensing", sees=(*_TRUE.split(), "stuck"), writes=_named("measured")),
-        Port(
-            "estimation",
-            sees=(*_named("measured"), "thrusts", *_RECEIVED),
-            writes=_named("estimated"),
-        ),
-        Port(
-            "supervision",
-            sees=(*_named("estimated"), "thrusts", *_RECEIVED),
-            writes=("phase", "clock"),
-        ),
-        Port("reference", sees=(), writes=("reference", "nominal_forces")),
-        Port("load_control", sees=("estimated_load", "reference"), writes=("force",)),
-        Port(
-            "allocation",
-            sees=("force", "reference", "nominal_forces"),
-            writes=("desired_tensions", "desired_directions", "allocator_info"),
-            answers=True,
-        ),
-        Port("link", sees=("desired_tensions", "desired_directions"), writes=_RECEIVED),
+        Port("sensing", sees=(*_TRUE.split(), "stuck")),
+        Port("estimation", sees=(*_named("measured"), "thrusts", *_RECEIVED)),
+        Port("supervision", sees=(*_named("estimated"), "thrusts", *_RECEIVED)),
+        Port("reference", sees=()),
+        Port("load_control", sees=("estimated_load", "reference")),
+        Port("allocation", sees=("force", "reference", "nominal_forces"), answers=True),
+        Port("link", sees=("desired_tensions", "desired_directions")),
         Port(
             "position_control",
             sees=(*_named("estimated")[1:], "reference", "nominal_forces", *_RECEIVED),
-            writes=("drone_forces", "thrusts", "desired_attitudes", "desired_rates"),
         ),
         Port(
             "attitude_control",
             sees=("estimated_attitudes", "estimated_rates", "desired_attitudes", "desired_rates"),
-            writes=("torques",),
         ),
-        Port(
-            "actuation",
-            sees=("thrusts", "torques", "motor_health"),
-            writes=("applied_thrusts", "applied_torques", "saturated_times"),
-        ),
-        Port(
-            "detection",
-            sees=(*_named("estimated")[:4], "thrusts", *_RECEIVED),
-            writes=("carrying",),
-        ),
-        Port("plant_observe", sees=(), writes=(*_TRUE.split(), "directions", "direction_rates")),
-        Port(
-            "plant",
-            sees=("applied_thrusts", "applied_torques", "external_forces", "attached"),
-            writes=("tensions", "peak_tensions", "catch_impulses", "slack_times"),
-        ),
+        Port("actuation", sees=("thrusts", "torques", "motor_health")),
+        Port("detection", sees=(*_named("estimated")[:4], "thrusts", *_RECEIVED)),
+        Port("plant_observe", sees=()),
+        Port("plant", sees=("applied_thrusts", "applied_torques", "external_forces", "attached")),
         Port(
             "disturbance",
             sees=(
                 "load", "positions", "velocities", "attitudes", "directions", "direction_rates",
                 "applied_thrusts", "attached",
             ),
-            writes=("wind", "external_forces"),
         ),
     )
 }  # fmt: skip

@@ -1,7 +1,8 @@
 """Everything that flows between the layers, in one table.
 
 The loop keeps one row of numbers, the *bus*; every signal is a named view of a part of it. Writing
-the row to the log records all of them at once, and this table is the legend of a recording.
+the row to the log records all of them at once, and this table is the legend of a recording. A new signal
+is one line here: the kernels of the layer that is named as its ``writer`` find it among what they write.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ class Signal:
     """Value until the first writer."""
     each: str = "row"
     """Recorded in each ``"row"`` of the log, or for each ``"allocation"``."""
+    writer: str = ""
+    """Port whose kernel writes it (:data:`colift.kernel.ports.PORTS`); none for what faults change."""
 
     def shape_for(self, n: int) -> tuple[int, ...]:
         """Shape with the number of drones filled in."""
@@ -44,50 +47,50 @@ class Signal:
 
 
 SIGNALS = (
-    Signal("reference", (4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives"),
-    Signal("load", (2, 3), "m, m/s", "x_L", "world", "load position and velocity"),
-    Signal("force", (3,), "N", "u_L", "world", "wanted total force of the cables on the load"),
-    Signal("desired_tensions", ("n",), "N", "T_id", "-", "tensions wanted by the allocator"),
-    Signal("desired_directions", ("n", 3), "1", "alpha_id", "world", "unit directions drone to load wanted by the allocator"),
-    Signal("tensions", ("n",), "N", "T_i", "-", "actual tensions"),
-    Signal("peak_tensions", ("n+1",), "N", "-", "-", "largest tension of each cable and, last, largest sum of them since the row before"),
-    Signal("catch_impulses", ("n",), "N s", "-", "-", "largest impulse with which each cable came taut since the row before"),
-    Signal("directions", ("n", 3), "1", "alpha_i", "world", "actual unit directions from drone to load"),
-    Signal("direction_rates", ("n", 3), "1/s", "alpha_dot_i", "world", "time derivatives of the directions"),
-    Signal("positions", ("n", 3), "m", "x_i", "world", "drone positions"),
-    Signal("velocities", ("n", 3), "m/s", "x_dot_i", "world", "drone velocities"),
-    Signal("attitudes", ("n", 4), "1", "q_i", "body to world", "drone attitudes, quaternion wxyz"),
-    Signal("rates", ("n", 3), "rad/s", "Omega_i", "body", "drone body rates"),
-    Signal("drone_forces", ("n", 3), "N", "u_i", "world", "wanted thrust vectors"),
-    Signal("thrusts", ("n",), "N", "f_i", "-", "thrust commands"),
-    Signal("desired_attitudes", ("n", 4), "1", "q_id", "body to world", "wanted attitudes, wxyz"),
-    Signal("desired_rates", ("n", 3), "rad/s", "Omega_id", "body", "wanted body rates"),
-    Signal("torques", ("n", 3), "N m", "tau_i", "body", "torque commands"),
-    Signal("external_forces", ("n+1", 3), "N", "d", "world", "disturbing forces on the drones and, last row, the load"),
+    Signal("reference", (4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives", writer="reference"),
+    Signal("load", (2, 3), "m, m/s", "x_L", "world", "load position and velocity", writer="plant_observe"),
+    Signal("force", (3,), "N", "u_L", "world", "wanted total force of the cables on the load", writer="load_control"),
+    Signal("desired_tensions", ("n",), "N", "T_id", "-", "tensions wanted by the allocator", writer="allocation"),
+    Signal("desired_directions", ("n", 3), "1", "alpha_id", "world", "unit directions drone to load wanted by the allocator", writer="allocation"),
+    Signal("tensions", ("n",), "N", "T_i", "-", "actual tensions", writer="plant"),
+    Signal("peak_tensions", ("n+1",), "N", "-", "-", "largest tension of each cable and, last, largest sum of them since the row before", writer="plant"),
+    Signal("catch_impulses", ("n",), "N s", "-", "-", "largest impulse with which each cable came taut since the row before", writer="plant"),
+    Signal("directions", ("n", 3), "1", "alpha_i", "world", "actual unit directions from drone to load", writer="plant_observe"),
+    Signal("direction_rates", ("n", 3), "1/s", "alpha_dot_i", "world", "time derivatives of the directions", writer="plant_observe"),
+    Signal("positions", ("n", 3), "m", "x_i", "world", "drone positions", writer="plant_observe"),
+    Signal("velocities", ("n", 3), "m/s", "x_dot_i", "world", "drone velocities", writer="plant_observe"),
+    Signal("attitudes", ("n", 4), "1", "q_i", "body to world", "drone attitudes, quaternion wxyz", writer="plant_observe"),
+    Signal("rates", ("n", 3), "rad/s", "Omega_i", "body", "drone body rates", writer="plant_observe"),
+    Signal("drone_forces", ("n", 3), "N", "u_i", "world", "wanted thrust vectors", writer="position_control"),
+    Signal("thrusts", ("n",), "N", "f_i", "-", "thrust commands", writer="position_control"),
+    Signal("desired_attitudes", ("n", 4), "1", "q_id", "body to world", "wanted attitudes, wxyz", writer="position_control"),
+    Signal("desired_rates", ("n", 3), "rad/s", "Omega_id", "body", "wanted body rates", writer="position_control"),
+    Signal("torques", ("n", 3), "N m", "tau_i", "body", "torque commands", writer="attitude_control"),
+    Signal("external_forces", ("n+1", 3), "N", "d", "world", "disturbing forces on the drones and, last row, the load", writer="disturbance"),
     Signal("attached", ("n",), "1", "-", "-", "1 while a cable holds, 0 once it is cut", initial=1.0),
-    Signal("slack_times", ("n",), "s", "-", "-", "time that each cable has spent without tension"),
-    Signal("measured_load", (2, 3), "m, m/s", "-", "world", "load position and velocity as measured"),
-    Signal("measured_positions", ("n", 3), "m", "-", "world", "drone positions as measured"),
-    Signal("measured_velocities", ("n", 3), "m/s", "-", "world", "drone velocities as measured"),
-    Signal("measured_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes as measured, wxyz"),
-    Signal("measured_rates", ("n", 3), "rad/s", "-", "body", "drone body rates as measured"),
-    Signal("estimated_load", (2, 3), "m, m/s", "-", "world", "load position and velocity that the controllers use"),
-    Signal("estimated_positions", ("n", 3), "m", "-", "world", "drone positions that the controllers use"),
-    Signal("estimated_velocities", ("n", 3), "m/s", "-", "world", "drone velocities that the controllers use"),
-    Signal("estimated_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes that the controllers use, wxyz"),
-    Signal("estimated_rates", ("n", 3), "rad/s", "-", "body", "drone body rates that the controllers use"),
-    Signal("received_tensions", ("n",), "N", "-", "-", "wanted tensions that have reached the drones"),
-    Signal("received_directions", ("n", 3), "1", "-", "world", "wanted directions that have reached the drones"),
-    Signal("applied_thrusts", ("n",), "N", "-", "-", "thrusts that act"),
-    Signal("applied_torques", ("n", 3), "N m", "-", "body", "torques that act"),
-    Signal("saturated_times", ("n",), "s", "-", "-", "time in which each drone's motors could not give what was commanded"),
-    Signal("wind", (3,), "m/s", "-", "world", "velocity of the air"),
-    Signal("carrying", ("n",), "1", "-", "-", "1 for a drone that is taken to carry, 0 once it is judged lost", initial=1.0),
+    Signal("slack_times", ("n",), "s", "-", "-", "time that each cable has spent without tension", writer="plant"),
+    Signal("measured_load", (2, 3), "m, m/s", "-", "world", "load position and velocity as measured", writer="sensing"),
+    Signal("measured_positions", ("n", 3), "m", "-", "world", "drone positions as measured", writer="sensing"),
+    Signal("measured_velocities", ("n", 3), "m/s", "-", "world", "drone velocities as measured", writer="sensing"),
+    Signal("measured_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes as measured, wxyz", writer="sensing"),
+    Signal("measured_rates", ("n", 3), "rad/s", "-", "body", "drone body rates as measured", writer="sensing"),
+    Signal("estimated_load", (2, 3), "m, m/s", "-", "world", "load position and velocity that the controllers use", writer="estimation"),
+    Signal("estimated_positions", ("n", 3), "m", "-", "world", "drone positions that the controllers use", writer="estimation"),
+    Signal("estimated_velocities", ("n", 3), "m/s", "-", "world", "drone velocities that the controllers use", writer="estimation"),
+    Signal("estimated_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes that the controllers use, wxyz", writer="estimation"),
+    Signal("estimated_rates", ("n", 3), "rad/s", "-", "body", "drone body rates that the controllers use", writer="estimation"),
+    Signal("received_tensions", ("n",), "N", "-", "-", "wanted tensions that have reached the drones", writer="link"),
+    Signal("received_directions", ("n", 3), "1", "-", "world", "wanted directions that have reached the drones", writer="link"),
+    Signal("applied_thrusts", ("n",), "N", "-", "-", "thrusts that act", writer="actuation"),
+    Signal("applied_torques", ("n", 3), "N m", "-", "body", "torques that act", writer="actuation"),
+    Signal("saturated_times", ("n",), "s", "-", "-", "time in which each drone's motors could not give what was commanded", writer="actuation"),
+    Signal("wind", (3,), "m/s", "-", "world", "velocity of the air", writer="disturbance"),
+    Signal("carrying", ("n",), "1", "-", "-", "1 for a drone that is taken to carry, 0 once it is judged lost", initial=1.0, writer="detection"),
     Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives", initial=1.0),
     Signal("stuck", ("n+1",), "1", "-", "-", "1 where the sensors of a drone or, last, the load repeat their last value"),
     Signal("allocator_up", (1,), "1", "-", "-", "1 where the allocator answers, 0 where it is silent", initial=1.0),
-    Signal("phase", (1,), "1", "-", "-", "what the supervisor is about; 0 is flying"),
-    Signal("clock", (2,), "s, 1", "-", "-", "time that the reference is given, and how fast it runs: 1 as time does, 0 held", initial=0.0),
+    Signal("phase", (1,), "1", "-", "-", "what the supervisor is about; 0 is flying", writer="supervision"),
+    Signal("clock", (2,), "s, 1", "-", "-", "time that the reference is given, and how fast it runs: 1 as time does, 0 held", initial=0.0, writer="supervision"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 
@@ -101,6 +104,7 @@ ANSWER = Signal(
     "-",
     "-",
     "what an allocator says of its answer: the middle ones of CYCLE_SIGNALS",
+    writer="allocation",
 )
 """Not recorded as such."""
 
@@ -112,6 +116,7 @@ NOMINAL = Signal(
     "world",
     "planned pull of each cable on its drone and two derivatives; not numbers where nothing is planned",
     initial=np.nan,
+    writer="reference",
 )
 """Not recorded: what follows a plan has it on file."""
 
