@@ -319,6 +319,15 @@ class FieldTable(SphinxDirective):
         return [table(FIELD_HEAD, field_rows(Mission, skip))]
 
 
+FEW = 2
+"""As many parts of a layer are found without a line of contents."""
+
+
+def place(layer: str, kind: str) -> str:
+    """Name of the place of a part on its page."""
+    return f"{layer}-{kind}".replace("_", "-")
+
+
 class PartTables(SphinxDirective):
     """All parts of one layer: what each is, and its settings."""
 
@@ -327,11 +336,13 @@ class PartTables(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         layer = self.arguments[0]
         out: list[nodes.Node] = []
+        if len(names(layer)) > FEW:
+            out.append(self.contents(layer))
         for kind in names(layer):
             part = find(layer, kind)
             note = " (default)" if DEFAULT_KINDS.get(layer) == kind else ""
             line = (part.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
-            paragraph = nodes.paragraph()
+            paragraph = nodes.paragraph(ids=[place(layer, kind)])
             paragraph += [nodes.strong("", "", code(f'kind = "{kind}"')), nodes.Text(f"{note}: ")]
             paragraph += cell(re.sub(r"\s+", " ", line)).children[0].children
             out.append(paragraph)
@@ -339,6 +350,14 @@ class PartTables(SphinxDirective):
             if rows:
                 out.append(table(FIELD_HEAD, rows))
         return out
+
+    def contents(self, layer: str) -> nodes.paragraph:
+        """A line with a link to each part."""
+        paragraph = nodes.paragraph("", "Parts: ")
+        for number, kind in enumerate(names(layer)):
+            paragraph += nodes.Text(", " if number else "")
+            paragraph += nodes.reference("", kind, refid=place(layer, kind), internal=True)
+        return paragraph
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

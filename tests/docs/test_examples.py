@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import colift
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
@@ -47,3 +51,39 @@ def test_the_example_at_the_top_flies_from_the_command_line(tmp_path: Path) -> N
     assert metrics["tracking_rms_m"] < 0.01
     assert metrics["allocator_failures"] == 0
     assert metrics["tension_imbalance"] > 1.2  # the weak battery carries less
+
+
+def test_a_signal_of_ones_own_is_one_file_and_one_line(tmp_path: Path) -> None:
+    page = (EXAMPLES.parent / "extend.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"^```{code-block} python\n( *Signal\(.*\n)```$", page, re.MULTILINE)
+    (command,) = re.findall(r"^colift (run .*my_signal_part\.py.*)$", page, re.MULTILINE)
+    source = tmp_path / "src"
+    shutil.copytree(
+        Path(colift.__file__).parent,
+        source / "colift",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
+    table = source / "colift" / "kernel" / "signals.py"
+    before, end, after = table.read_text(encoding="utf-8").partition(")  # fmt: skip\n")
+    assert "SIGNALS = (" in before
+    table.write_text(before + line + end + after, encoding="utf-8")
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "colift", *command.split()),
+            *("--set", "timing.duration=5.0", "--out", str(tmp_path / "out")),
+        ],
+        capture_output=True,
+        text=True,
+        cwd=EXAMPLES,
+        env=os.environ | {"COLIFT_CACHE": str(tmp_path / "cache"), "PYTHONPATH": str(source)},
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    # Read by a colift that does not know the signal: the file says what it is.
+    (path,) = (tmp_path / "out").rglob("*.h5")
+    recording = colift.Recording.load(path)
+    weighed = recording["weighed_mass"]
+    assert weighed.shape == (len(recording.time), 1)
+    assert recording.signal("weighed_mass").unit == "kg"
+    assert abs(weighed[-1, 0] - 1.2 * recording.mission.team.load_mass) < 0.003

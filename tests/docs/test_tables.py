@@ -25,7 +25,7 @@ WHOLE = {"performance.md": "performance"}
 """Pages that a script writes from their first line to their last."""
 NOT_MEASURED = {
     ("world.md", "default"): "settings and where they come from",
-    ("extend.md", "level"): "exit codes",
+    ("mission-reference.md", "level"): "exit codes",
     ("paper-to-code.md", "value"): "settings",
     ("objective.md", "$n$"): "proofs",
 }
