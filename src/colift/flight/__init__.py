@@ -1,1 +1,1 @@
-"""The closed loop: `signals` (what flows), `loop` (the block diagram), `flight` (running it)."""
+"""The closed loop: `loop` (the block diagram), `flight` (running it), `runner` (from a mission to its numbers)."""
