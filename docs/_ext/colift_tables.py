@@ -82,7 +82,8 @@ def cell(content: str | nodes.Node) -> nodes.entry:
     paragraph = nodes.paragraph()
     if isinstance(content, nodes.Node):
         paragraph += content
-    else:  # double backticks, as in docstrings, become code
+    else:  # double backticks and names of objects, as in docstrings, become code
+        content = re.sub(r":\w+:`~?([\w.]+)`", r"``\1``", content)
         for k, piece in enumerate(re.split(r"``(.+?)``", content)):
             if piece:
                 paragraph += code(piece) if k % 2 else nodes.Text(piece)
