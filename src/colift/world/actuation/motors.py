@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import noise
 from colift.kernel.math.smooth import decay
-from colift.part import Places, Vector, carry_rows
+from colift.part import Vector
 from colift.team import Team
 from colift.world.actuation.base import SIGNATURE, ActuationPart
 
@@ -24,11 +25,17 @@ _Y = (1.0, 1.0, -1.0, -1.0)
 _SPIN = (1.0, -1.0, 1.0, -1.0)
 
 _ROUNDING = 1e-9  # N, by which a thrust may miss its limits before the mixer gives something up
-# Params before the drones' largest thrusts: lever, ratio, lag, rate, noise kept and added a tick, offset (2), least.
-_HEAD = 9
-_SLOTS = (
-    9  # memory per drone: 1 + tick of the noise (0: not started), thrust and noise of each motor
-)
+
+PARAMS = Layout(
+    team={
+        "lever": 1, "ratio": 1, "lag": 1, "rate": 1, "keep": 1, "kick": 1, "offset": 2, "least": 1,
+    },
+    drone={"most": 1},
+)  # fmt: skip
+"""``keep`` and ``kick``: share of the noise that stays over a tick, and what is added; thrusts ``least`` and ``most``."""
+MEMORY = Layout(drone={"next": 1, "thrust": 4, "noise": 4, "wanted": 4})
+"""``next``: number of the tick whose noise comes next, 0 at the start; then of each motor."""
+P, M = PARAMS.at, MEMORY.at
 
 
 @inline
@@ -72,39 +79,39 @@ def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     applied_thrusts, applied_torques = writes.applied_thrusts, writes.applied_torques
     saturated_times = writes.saturated_times
     n = thrusts.shape[0]
-    lever, ratio, lag, rate = params[0], params[1], params[2], params[3]
+    lever, ratio, lag, rate = params[P.lever], params[P.ratio], params[P.lag], params[P.rate]
     keep = decay(dt, lag)
     now = noise.tick(step, dt)
     for i in range(n):
-        o = _SLOTS * i
-        wanted = memory[_SLOTS * n + 4 * i : _SLOTS * n + 4 * (i + 1)]
+        o = M.rows + M.width * i
+        wanted = memory[o + M.wanted : o + M.wanted + 4]
         fits = mix(
-            thrusts[i], torques[i, 0], torques[i, 1], torques[i, 2], lever, ratio, params[8],
-            params[_HEAD + i], wanted,
+            thrusts[i], torques[i, 0], torques[i, 1], torques[i, 2], lever, ratio, params[P.least],
+            params[P.rows + P.width * i + P.most], wanted,
         )  # fmt: skip
         if not fits:
             saturated_times[i] += dt
-        fresh = memory[o] == 0.0
-        for number in range(now if fresh else int(memory[o]), now + 1):
+        fresh = memory[o + M.next] == 0.0
+        for number in range(now if fresh else int(memory[o + M.next]), now + 1):
             for pair in range(2):
                 kick = noise.normals(key, number, 2 * i + pair)
                 for j in range(2):
-                    N = o + 5 + 2 * pair + j
-                    memory[N] = params[4] * memory[N] + params[5] * kick[j]
-        memory[o] = now + 1
+                    N = o + M.noise + 2 * pair + j
+                    memory[N] = params[P.keep] * memory[N] + params[P.kick] * kick[j]
+        memory[o + M.next] = now + 1
         f = tau_x = tau_y = tau_z = 0.0
         for j in range(4):
-            T = memory[o + 1 + j]
+            T = memory[o + M.thrust + j]
             if fresh:
                 T = wanted[j]
             else:
                 change = (1.0 - keep) * (wanted[j] - T)
                 T += min(max(change, -rate * dt), rate * dt)
-            memory[o + 1 + j] = T
-            acting = motor_health[i, j] * max(T + memory[o + 5 + j], 0.0)
+            memory[o + M.thrust + j] = T
+            acting = motor_health[i, j] * max(T + memory[o + M.noise + j], 0.0)
             f += acting
-            tau_x += (lever * _Y[j] - params[7]) * acting
-            tau_y -= (lever * _X[j] - params[6]) * acting
+            tau_x += (lever * _Y[j] - params[P.offset + 1]) * acting
+            tau_y -= (lever * _X[j] - params[P.offset]) * acting
             tau_z += ratio * _SPIN[j] * acting
         applied_thrusts[i] = f
         applied_torques[i, 0] = tau_x
@@ -124,6 +131,7 @@ class Motors(ActuationPart):
     """
 
     kernel = _turn
+    remembers = MEMORY
     per_drone = ("max_thrust",)
     thrust_setting: ClassVar[str] = "max_thrust"
 
@@ -171,14 +179,10 @@ class Motors(ActuationPart):
 
     def params(self, team: Team) -> Vector:
         lever = self.arm_length / math.sqrt(2.0)
-        most = np.broadcast_to(np.asarray(self.max_thrust, dtype=float), team.n)
         keep = math.exp(-noise.TICK / self.time_constant) if self.time_constant > 0.0 else 0.0
         kick = self.noise * math.sqrt(1.0 - keep * keep)
-        head = [lever, self.torque_ratio, self.time_constant, self.max_rate, keep, kick]
-        return np.array([*head, *self.centre_offset, self.min_thrust, *most])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros((_SLOTS + 4) * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, _SLOTS, places)
+        return PARAMS.pack(
+            team.n, lever=lever, ratio=self.torque_ratio, lag=self.time_constant,
+            rate=self.max_rate, keep=keep, kick=kick, offset=self.centre_offset,
+            least=self.min_thrust, most=self.max_thrust,
+        )  # fmt: skip

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.part import Vector
 from colift.team import Team
@@ -30,6 +30,10 @@ _HEAVY, _LIGHT = (
 )
 _WEIGHTS = (_LIGHT, _HEAVY, 64.0 / 225.0, _HEAVY, _LIGHT)
 _CORE = 6.0  # length of a jet's core in diameters
+
+PARAMS = Layout(team={"density": 1, "radius": 1, "drone_area": 1, "load_area": 1, "cable": 1})
+"""``cable``: drag coefficient times diameter."""
+P = PARAMS.at
 
 
 @inline
@@ -79,13 +83,14 @@ def _wash(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     attached = sees.attached
     wind, external = writes.wind, writes.external_forces
     n = positions.shape[0]
-    half_rho, radius = 0.5 * params[0], 2.0 * params[1]  # four rotors as one disc
-    drone, body, cable = half_rho * params[2], half_rho * params[3], half_rho * params[4]
+    half_rho, radius = 0.5 * params[P.density], 2.0 * params[P.radius]  # four rotors as one disc
+    drone, body = half_rho * params[P.drone_area], half_rho * params[P.load_area]
+    cable = half_rho * params[P.cable]
     for j in range(n):
         if thrusts[j] <= 0.0:
             continue
         # Momentum theory: f = 2 rho A v^2.
-        induced = math.sqrt(thrusts[j] / (2.0 * params[0] * math.pi * radius * radius))
+        induced = math.sqrt(thrusts[j] / (2.0 * params[P.density] * math.pi * radius * radius))
         ux, uy, uz = quaternion.third_axis(
             attitudes[j, 0], attitudes[j, 1], attitudes[j, 2], attitudes[j, 3]
         )
@@ -176,7 +181,7 @@ class Downwash(DisturbancePart):
     """Drag coefficient of the cables across the wake."""
 
     def params(self, team: Team) -> Vector:
-        cable = self.cable_diameter * self.cable_coefficient
-        return np.array(
-            [self.air_density, self.rotor_radius, self.drone_area, self.load_area, cable]
-        )
+        return PARAMS.pack(
+            team.n, density=self.air_density, radius=self.rotor_radius, drone_area=self.drone_area,
+            load_area=self.load_area, cable=self.cable_diameter * self.cable_coefficient,
+        )  # fmt: skip

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.part import Vector
 from colift.team import Team
@@ -20,6 +20,15 @@ Linear = Annotated[float, Field(ge=0.0, le=10.0)]
 # Gauss and Legendre's three points on (0, 1): exact for polynomials up to degree five.
 _POINTS = (0.5 - 0.5 * math.sqrt(0.6), 0.5, 0.5 + 0.5 * math.sqrt(0.6))
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+
+PARAMS = Layout(
+    team={
+        "density": 1, "drone_area": 1, "drone_linear": 1, "load_area": 1, "load_linear": 1,
+        "rotor_drag": 1, "cable": 1,
+    }
+)  # fmt: skip
+"""``cable``: drag coefficient times diameter."""
+P = PARAMS.at
 
 
 @inline
@@ -39,11 +48,16 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     attached = sees.attached
     wind, external = writes.wind, writes.external_forces
     n = positions.shape[0]
-    half_rho = 0.5 * params[0]
-    _on_body(load[1], wind, half_rho * params[3], params[4], external[n])
+    half_rho = 0.5 * params[P.density]
+    _on_body(
+        load[1], wind, half_rho * params[P.load_area], params[P.load_linear], external[n]
+    )  # fmt: skip
     for i in range(n):
-        _on_body(velocities[i], wind, half_rho * params[1], params[2], external[i])
-        if params[5] > 0.0:
+        _on_body(
+            velocities[i], wind, half_rho * params[P.drone_area], params[P.drone_linear],
+            external[i],
+        )  # fmt: skip
+        if params[P.rotor_drag] > 0.0:
             # In the rotors' plane, in proportion to thrust: blades flap and drag unevenly.
             axis = quaternion.third_axis(
                 attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
@@ -53,8 +67,8 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 along += axis[k] * (wind[k] - velocities[i, k])
             for k in range(3):
                 across = wind[k] - velocities[i, k] - along * axis[k]
-                external[i, k] += params[5] * thrusts[i] * across
-        if attached[i] == 0.0 or params[6] == 0.0:
+                external[i, k] += params[P.rotor_drag] * thrusts[i] * across
+        if attached[i] == 0.0 or params[P.cable] == 0.0:
             continue
         length = 0.0
         for k in range(3):
@@ -67,7 +81,7 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 along += past * directions[i, k]
                 squared += past * past
             normal = math.sqrt(max(squared - along * along, 0.0))
-            scale = _WEIGHTS[m] * half_rho * params[6] * length * normal
+            scale = _WEIGHTS[m] * half_rho * params[P.cable] * length * normal
             for k in range(3):
                 past = wind[k] - (1.0 - s) * velocities[i, k] - s * load[1, k]
                 force = scale * (past - along * directions[i, k])
@@ -106,6 +120,8 @@ class Drag(DisturbancePart):
     """Drag coefficient of the cables across the wind (a cylinder's below Re = 10^5)."""
 
     def params(self, team: Team) -> Vector:
-        drone, load = (self.drone_area, self.drone_linear), (self.load_area, self.load_linear)
-        cable = self.cable_diameter * self.cable_coefficient
-        return np.array([self.air_density, *drone, *load, self.rotor_drag, cable])
+        return PARAMS.pack(
+            team.n, density=self.air_density, drone_area=self.drone_area,
+            drone_linear=self.drone_linear, load_area=self.load_area, load_linear=self.load_linear,
+            rotor_drag=self.rotor_drag, cable=self.cable_diameter * self.cable_coefficient,
+        )  # fmt: skip

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import noise
 from colift.part import Vector
 from colift.team import Team
@@ -18,6 +18,11 @@ _FOOT = 0.3048
 _LOWEST, _HIGHEST = 10.0, 1000.0  # of the low-altitude model, feet
 _SLOWEST = 0.1  # airspeed, m/s: below it the air would not change at all
 _ROOT3 = math.sqrt(3.0)
+
+PARAMS = Layout(team={"speed": 1, "cosine": 1, "sine": 1})
+MEMORY = Layout(team={"next": 1, "u": 1, "v": 2, "w": 2})
+"""``next``: number of the tick that comes next, 0 at the start; ``u``, and p and q of ``v`` and ``w``, for unit standard deviation."""
+P, M = PARAMS.at, MEMORY.at
 
 
 @inline
@@ -63,31 +68,30 @@ def _dryden(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, key, dt = now.step, now.key, now.dt
     load = sees.load
     wind = writes.wind
-    # memory: 1 + tick (0: not started); u; p and q of v; p and q of w; each for unit standard deviation
-    L_u, L_w, sigma_u, sigma_w = scales(load[0, 2], params[0])
+    L_u, L_w, sigma_u, sigma_w = scales(load[0, 2], params[P.speed])
     now = noise.tick(step, dt)
-    if memory[0] == 0.0:
-        memory[0] = now
-        memory[1] = noise.normal(key, -1, 0)
+    if memory[M.next] == 0.0:
+        memory[M.next] = now
+        memory[M.u] = noise.normal(key, -1, 0)
         for m in range(2):
             a, b = noise.normals(key, -1, 1 + m)
-            memory[2 + 2 * m] = math.sqrt(0.5) * a
-            memory[3 + 2 * m] = math.sqrt(0.125) * (a + b)
+            memory[M.v + 2 * m] = math.sqrt(0.5) * a
+            memory[M.v + 2 * m + 1] = math.sqrt(0.125) * (a + b)
     x, y, z = wind[0] - load[1, 0], wind[1] - load[1, 1], wind[2] - load[1, 2]
     airspeed = max(math.sqrt(x * x + y * y + z * z), _SLOWEST)
-    for number in range(int(memory[0]), now + 1):
+    for number in range(int(memory[M.next]), now + 1):
         along = airspeed * noise.TICK / L_u
-        first_order(memory, 1, along, noise.normal(key, number, 0))
+        first_order(memory, M.u, along, noise.normal(key, number, 0))
         a, b = noise.normals(key, number, 1)
-        second_order(memory, 2, along, a, b)
+        second_order(memory, M.v, along, a, b)
         a, b = noise.normals(key, number, 2)
-        second_order(memory, 4, airspeed * noise.TICK / L_w, a, b)
-    memory[0] = now + 1
-    u = sigma_u * memory[1]
-    v = sigma_u * (_ROOT3 * memory[2] + (1.0 - _ROOT3) * memory[3])
-    w = sigma_w * (_ROOT3 * memory[4] + (1.0 - _ROOT3) * memory[5])
-    wind[0] += params[1] * u - params[2] * v
-    wind[1] += params[2] * u + params[1] * v
+        second_order(memory, M.w, airspeed * noise.TICK / L_w, a, b)
+    memory[M.next] = now + 1
+    u = sigma_u * memory[M.u]
+    v = sigma_u * (_ROOT3 * memory[M.v] + (1.0 - _ROOT3) * memory[M.v + 1])
+    w = sigma_w * (_ROOT3 * memory[M.w] + (1.0 - _ROOT3) * memory[M.w + 1])
+    wind[0] += params[P.cosine] * u - params[P.sine] * v
+    wind[1] += params[P.sine] * u + params[P.cosine] * v
     wind[2] += w
 
 
@@ -101,6 +105,7 @@ class Dryden(DisturbancePart):
     """
 
     kernel = _dryden
+    remembers = MEMORY
     makes_wind: ClassVar[bool] = True
 
     speed: Annotated[float, Field(ge=0.0, le=60.0)] = 5.0
@@ -111,7 +116,6 @@ class Dryden(DisturbancePart):
 
     def params(self, team: Team) -> Vector:
         heading = math.radians(self.heading_deg)
-        return np.array([self.speed, math.cos(heading), math.sin(heading)])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(6)
+        return PARAMS.pack(
+            team.n, speed=self.speed, cosine=math.cos(heading), sine=math.sin(heading)
+        )

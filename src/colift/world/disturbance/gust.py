@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import noise
 from colift.part import Vector
 from colift.team import Team
@@ -16,13 +16,16 @@ from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Speed = Annotated[float, Field(ge=-60.0, le=60.0)]
 
+PARAMS = Layout(team={"peak": 3, "begin": 1, "duration": 1, "interval": 1})
+P = PARAMS.at
+
 
 @kernel(SIGNATURE)
 def _gust(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, key, dt = now.step, now.key, now.dt
     wind = writes.wind
-    since = step * dt - params[3]
-    duration, interval = params[4], params[5]
+    since = step * dt - params[P.begin]
+    duration, interval = params[P.duration], params[P.interval]
     size = 1.0
     if interval > 0.0 and since >= 0.0:
         # One gust in each interval, somewhere within it.
@@ -32,7 +35,7 @@ def _gust(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if 0.0 <= since < duration:
         size *= 0.5 * (1.0 - math.cos(2.0 * math.pi * since / duration))
         for k in range(3):
-            wind[k] += size * params[k]
+            wind[k] += size * params[P.peak + k]
 
 
 class Gust(DisturbancePart):
@@ -52,7 +55,9 @@ class Gust(DisturbancePart):
     single gust, at its time and whole."""
 
     def params(self, team: Team) -> Vector:
-        return np.array([*self.peak, self.at, self.duration, self.every])
+        return PARAMS.pack(
+            team.n, peak=self.peak, begin=self.at, duration=self.duration, interval=self.every
+        )
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         if 0.0 < self.every < self.duration:

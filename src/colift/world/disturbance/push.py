@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
 from colift.part import Vector
 from colift.team import Team
 from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Newton = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+PARAMS = Layout(team={"force": 3, "begin": 1, "end": 1})
+P = PARAMS.at
 
 
 @kernel(SIGNATURE)
@@ -21,9 +24,9 @@ def _push(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     positions = sees.positions
     external = writes.external_forces
     t = step * dt
-    if params[3] <= t < params[4]:
+    if params[P.begin] <= t < params[P.end]:
         for k in range(3):
-            external[positions.shape[0], k] += params[k]
+            external[positions.shape[0], k] += params[P.force + k]
 
 
 class Push(DisturbancePart):
@@ -39,4 +42,4 @@ class Push(DisturbancePart):
     """s."""
 
     def params(self, team: Team) -> Vector:
-        return np.array([*self.force, self.at, self.at + self.duration])
+        return PARAMS.pack(team.n, force=self.force, begin=self.at, end=self.at + self.duration)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math.smooth import rest_to_rest
 from colift.part import Vector
 from colift.team import Team
 from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Speed = Annotated[float, Field(ge=-60.0, le=60.0)]
+
+PARAMS = Layout(team={"velocity": 3, "ramp": 1})
+P = PARAMS.at
 
 
 @kernel(SIGNATURE)
@@ -23,10 +26,10 @@ def _blow(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     wind = writes.wind
     t = step * dt
     share = 1.0
-    if t < params[3]:
-        share = rest_to_rest(t / params[3])[0]
+    if t < params[P.ramp]:
+        share = rest_to_rest(t / params[P.ramp])[0]
     for k in range(3):
-        wind[k] += share * params[k]
+        wind[k] += share * params[P.velocity + k]
 
 
 class Wind(DisturbancePart):
@@ -47,4 +50,4 @@ class Wind(DisturbancePart):
     def params(self, team: Team) -> Vector:
         heading = math.radians(self.heading_deg)
         level = [self.speed * math.cos(heading), self.speed * math.sin(heading)]
-        return np.array([*level, self.updraft, self.ramp])
+        return PARAMS.pack(team.n, velocity=[*level, self.updraft], ramp=self.ramp)
