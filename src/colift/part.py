@@ -102,7 +102,7 @@ class Part(BaseModel, metaclass=Refusing):
     needs: ClassVar[tuple[str, str] | None] = None
     """Package beyond colift's own that the kernel calls, and the extra that it belongs to."""
     remembers: ClassVar[Layout] = Layout()
-    """Names of the places in the kernel's memory; a part whose memory depends on its settings overrides :meth:`memory`."""
+    """Names of the places in the kernel's memory; sizes that depend on the settings are filled in by :meth:`layout`."""
     per_drone: ClassVar[tuple[str, ...]] = ()
     """Settings that may be a list with one value per drone."""
 
@@ -133,19 +133,24 @@ class Part(BaseModel, metaclass=Refusing):
         """Parameter vector of the kernel; constant between two calls of the kernel."""
         return np.zeros(0)
 
+    def layout(self) -> Layout:
+        """What :attr:`remembers` names, with the sizes that these settings ask for."""
+        return self.remembers
+
     def memory(self, team: Team) -> Vector:
         """Memory vector of the kernel in its initial state (integrators, warm starts, scratch)."""
-        return self.remembers.zeros(team.n)
+        return self.layout().zeros(team.n)
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         """Memory for the flight's next leg, after a drone has left or joined.
 
         ``old`` is the memory so far, ``fresh`` that of a start with the new team; ``places[i]`` is the
-        place that drone i of the new team had in the old one, or -1. What :attr:`remembers` names is kept; of other
+        place that drone i of the new team had in the old one, or -1. What :meth:`layout` names is kept; of other
         vectors those whose length does not depend on the number of drones.
         """
-        if self.remembers.at.rows + self.remembers.at.width > 0:
-            return self.remembers.carry_over(old, fresh, places)
+        layout = self.layout()
+        if layout.size(1) > 0:
+            return layout.carry_over(old, fresh, places)
         return old if fresh.size == old.size else fresh
 
     def call(
@@ -216,16 +221,6 @@ class Part(BaseModel, metaclass=Refusing):
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
         """Problems with the physics step or the length of the flight (s), as for :meth:`check`."""
         return []
-
-
-def carry_rows(old: Vector, fresh: Vector, head: int, width: int, places: Places) -> Vector:
-    """Copy ``head`` values and then the ``width`` values of every drone that stays into ``fresh``."""
-    fresh[:head] = old[:head]
-    for new, place in enumerate(places):
-        if place >= 0:
-            begin = head + width * place
-            fresh[head + width * new : head + width * (new + 1)] = old[begin : begin + width]
-    return fresh
 
 
 def timing_problems(

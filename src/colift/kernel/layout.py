@@ -10,6 +10,13 @@ A vector holds some fields of the whole team and then one row of fields for each
 
 Compiled code takes the places for constants. Size, initial value, what a regrouped team keeps and how tests look at a
 vector follow from the table.
+
+A size that depends on settings stays open::
+
+    MEMORY = Layout(drone={"started": 1, "queue": None})
+    MEMORY.filled(queue=20)            # of these settings
+
+Compiled code knows the places up to there; it is told any further ones, such as ``width``, as parameters.
 """
 
 from __future__ import annotations
@@ -31,7 +38,7 @@ class Layout:
     Parameters
     ----------
     team : mapping of name to size
-        Fields that stand once, first.
+        Fields that stand once, first. The size is None where it depends on settings.
     drone : mapping of name to size
         Fields of each drone, in a row of its own.
 
@@ -39,22 +46,36 @@ class Layout:
     ----------
     at : named tuple of int
         By name the first place of a field: in the vector for the team's, in its row for a drone's. ``at.rows`` is where the
-        first row begins, ``at.width`` the length of a row.
+        first row begins, ``at.width`` the length of a row. What stands behind an open size is missing.
 
     """
 
     def __init__(
-        self, team: Mapping[str, int] | None = None, drone: Mapping[str, int] | None = None
+        self,
+        team: Mapping[str, int | None] | None = None,
+        drone: Mapping[str, int | None] | None = None,
     ) -> None:
         self.team, self.drone = dict(team or {}), dict(drone or {})
-        places, end = {}, 0
-        for name, size in self.team.items():
-            places[name], end = end, end + size
-        rows, end = end, 0
-        for name, size in self.drone.items():
-            places[name], end = end, end + size
-        self.at: Any = named_tuple("Places", [*places, "rows", "width"], __name__)(
-            *places.values(), rows, end
+        self._sizes = {
+            name: size for name, size in {**self.team, **self.drone}.items() if size is not None
+        }
+        places: dict[str, int] = {}
+        for fields, end in ((self.team, "rows"), (self.drone, "width")):
+            place = 0
+            for name in [*fields, end]:
+                places[name] = place
+                if name in fields and name not in self._sizes:
+                    break
+                place += self._sizes.get(name, 0)
+        self.at: Any = named_tuple("Places", places, __name__)(*places.values())
+
+    def filled(self, **sizes: int) -> Layout:
+        """The same with these sizes for those that are open."""
+        if wrong := {*sizes} ^ ({*self.team, *self.drone} - {*self._sizes}):
+            raise TypeError(f"a size too many or too few: {', '.join(sorted(wrong))}")
+        known = {**self._sizes, **sizes}
+        return Layout(
+            {name: known[name] for name in self.team}, {name: known[name] for name in self.drone}
         )
 
     def size(self, n: int) -> int:
@@ -69,9 +90,9 @@ class Layout:
         """The places of one field in a vector: ``(size,)``, or ``(n, size)`` for a field of each drone."""
         begin = getattr(self.at, name)
         if name in self.team:
-            return vector[begin : begin + self.team[name]]
+            return vector[begin : begin + self._sizes[name]]
         rows = vector[self.at.rows :].reshape(-1, self.at.width)
-        return rows[:, begin : begin + self.drone[name]]
+        return rows[:, begin : begin + self._sizes[name]]
 
     def pack(self, n: int, **values: ArrayLike) -> Array:
         """A vector for n drones from a value for each field.
@@ -90,10 +111,14 @@ class Layout:
         return vector
 
     def carry_over(self, old: Array, fresh: Array, places: NDArray[np.int64]) -> Array:
-        """Into ``fresh`` what the team keeps, and the row of each drone that stays; see :meth:`colift.part.Part.carry_over`."""
+        """Into ``fresh`` what the team keeps, and the row of each drone that stays; see :meth:`colift.part.Part.carry_over`.
+
+        What a vector holds behind its rows is that of ``fresh``.
+        """
         rows, width = self.at.rows, self.at.width
         fresh[:rows] = old[:rows]
-        if width:
-            stay = places >= 0
-            fresh[rows:].reshape(-1, width)[stay] = old[rows:].reshape(-1, width)[places[stay]]
+        for new, place in enumerate(places):
+            if place >= 0:
+                now, before = rows + width * new, rows + width * int(place)
+                fresh[now : now + width] = old[before : before + width]
         return fresh

@@ -12,12 +12,18 @@ from pydantic import Field
 from colift.control.allocation.base import SIGNATURE, AllocatorPart, Status
 from colift.control.allocation.common.share import balance, begin, effort
 from colift.kernel.jit import kernel
-from colift.part import Places, Vector, carry_rows
+from colift.kernel.layout import Layout
+from colift.part import Vector
 from colift.team import Team
 
 _CONVERGED = int(Status.CONVERGED)
 _ZERO_FORCE = int(Status.ZERO_FORCE)
 _INVALID_FORCE = int(Status.INVALID_FORCE)
+
+PARAMS = Layout(team={"internal": 1, "settling": 1}, drone={"aim": 2})
+MEMORY = Layout(drone={"spread": 2})
+"""Horizontal parts of the spread ``d_i``, and where they go."""
+P, M = PARAMS.at, MEMORY.at
 
 
 @kernel(SIGNATURE)
@@ -28,25 +34,28 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     tensions, directions = writes.desired_tensions, writes.desired_directions
     info = writes.allocator_info
     n = tensions.shape[0]
-    internal, settling = params[0], params[1]
+    internal, settling = params[P.internal], params[P.settling]
     W = begin(force, tensions, info)
     if not math.isfinite(W):
         return _INVALID_FORCE
     follow = dt / (settling + dt) if dt > 0.0 else 0.0
     mx = my = 0.0
     for i in range(n):
+        d, aim = M.rows + M.width * i + M.spread, P.rows + P.width * i + P.aim
         for k in range(2):
-            memory[2 * i + k] += follow * (params[2 + 2 * i + k] - memory[2 * i + k])
-        mx += memory[2 * i] / n
-        my += memory[2 * i + 1] / n
+            memory[d + k] += follow * (params[aim + k] - memory[d + k])
+        mx += memory[d] / n
+        my += memory[d + 1] / n
     for i in range(n):
-        memory[2 * i] -= mx
-        memory[2 * i + 1] -= my
+        d = M.rows + M.width * i + M.spread
+        memory[d] -= mx
+        memory[d + 1] -= my
     if W == 0.0:
         return _ZERO_FORCE
     for i in range(n):
-        x = -force[0] / n - internal * memory[2 * i]
-        y = -force[1] / n - internal * memory[2 * i + 1]
+        d = M.rows + M.width * i + M.spread
+        x = -force[0] / n - internal * memory[d]
+        y = -force[1] / n - internal * memory[d + 1]
         z = -force[2] / n
         tensions[i] = math.sqrt(x * x + y * y + z * z)
         if tensions[i] > 1e-15 * W:
@@ -72,6 +81,7 @@ class InternalForce(AllocatorPart):
     """
 
     kernel = _allocate
+    remembers = MEMORY
     spread_setting = ("internal_force", (0.1, 0.2, 0.4, 0.7, 1.0))
 
     internal_force: Annotated[float, Field(ge=0.0, le=1e6)] = 0.4
@@ -87,13 +97,12 @@ class InternalForce(AllocatorPart):
         return np.column_stack([np.cos(azimuth), np.sin(azimuth)]) * (n > 1)
 
     def params(self, team: Team) -> Vector:
-        return np.array([self.internal_force, self.settling, *self.spread(team.n).ravel()])
+        return PARAMS.pack(
+            team.n, internal=self.internal_force, settling=self.settling, aim=self.spread(team.n)
+        )
 
     def memory(self, team: Team) -> Vector:
-        return self.spread(team.n).ravel()
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, 2, places)
+        return MEMORY.pack(team.n, spread=self.spread(team.n))
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         return float(0.5 * tensions @ tensions)

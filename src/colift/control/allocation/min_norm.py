@@ -16,7 +16,8 @@ from colift.control.allocation.base import (
 )
 from colift.control.allocation.common.share import balance, begin, effort
 from colift.kernel.jit import inline, kernel
-from colift.part import Places, Vector, carry_rows
+from colift.kernel.layout import Layout
+from colift.part import Places, Vector
 from colift.team import Team
 
 _CONVERGED = int(Status.CONVERGED)
@@ -29,7 +30,11 @@ _PUSHING = int(Status.PUSHING)
 RANK = 1e-9
 """A cable whose part outside the span of those before it is smaller adds no direction."""
 
-_UNKNOWN, _GIVEN, _READY = 0.0, 1.0, 2.0  # memory[0]: of the formation, and of its inverse
+_UNKNOWN, _GIVEN, _READY = 0.0, 1.0, 2.0  # of the formation, and of its inverse
+
+PARAMS = Layout(team={"push": 1})
+MEMORY = Layout(team={"known": 1}, drone={"formation": 3, "inverse": 3})
+P, M = PARAMS.at, MEMORY.at
 
 
 @inline
@@ -70,15 +75,16 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     tensions, directions = writes.desired_tensions, writes.desired_directions
     info = writes.allocator_info
     n = tensions.shape[0]
-    formation = memory[1 : 1 + 3 * n].reshape(n, 3)
-    inverse = memory[1 + 3 * n :].reshape(n, 3)
-    if memory[0] != _READY:
-        if memory[0] == _UNKNOWN:
+    rows = memory[M.rows :].reshape(n, M.width)
+    formation = rows[:, M.formation : M.formation + 3]
+    inverse = rows[:, M.inverse : M.inverse + 3]
+    if memory[M.known] != _READY:
+        if memory[M.known] == _UNKNOWN:
             for i in range(n):
                 for k in range(3):
                     formation[i, k] = directions[i, k]
         _pseudo_inverse(formation, inverse)
-        memory[0] = _READY
+        memory[M.known] = _READY
     W = begin(force, tensions, info)
     if not math.isfinite(W):
         return _INVALID_FORCE
@@ -99,7 +105,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         side = 1.0
         if tensions[i] < 0.0:
             negative = negative or tensions[i] < -1e-12 * W
-            if params[0] == 0.0:
+            if params[P.push] == 0.0:
                 tensions[i] = 0.0
             else:
                 tensions[i] = -tensions[i]
@@ -111,7 +117,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     if missing:
         info[INFO_GAP] = math.nan
     if negative:
-        return _CLAMPED if params[0] == 0.0 else _PUSHING
+        return _CLAMPED if params[P.push] == 0.0 else _PUSHING
     return _FORCE_REDUCED if missing else _CONVERGED
 
 
@@ -129,22 +135,20 @@ class MinNorm(AllocatorPart):
     """
 
     kernel = _allocate
+    remembers = MEMORY
 
     negative: Literal["clamp", "push"] = "clamp"
     """``clamp``: set to zero, which loses force (status ``CLAMPED``). ``push``: the mathematics' answer,
     shown as a positive tension on the opposite side, with the drone below the load (``PUSHING``)."""
 
     def params(self, team: Team) -> Vector:
-        return np.array([float(self.negative == "push")])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(1 + 6 * team.n)
+        return PARAMS.pack(team.n, push=self.negative == "push")
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         if np.any(places < 0):
             return fresh  # a drone has joined: the formation that it completes
-        carry_rows(old, fresh, 1, 3, places)
-        fresh[0] = min(old[0], _GIVEN)
+        super().carry_over(old, fresh, places)
+        fresh[M.known] = min(old[M.known], _GIVEN)
         return fresh
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:

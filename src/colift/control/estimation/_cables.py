@@ -12,11 +12,11 @@ _TRUST = 1e-3
 
 
 @inline
-def load_from_drones(n, drones, width, memory, lengths, params, guess):  # type: ignore[no-untyped-def]
+def load_from_drones(n, drones, width, memory, lengths, apart, params, guess):  # type: ignore[no-untyped-def]
     """Position and velocity of the load that fit taut cables best (least squares); ``guess`` fills gaps.
 
     Drone i's position and velocity stand at ``memory[drones + width * i]``, its cable's length at
-    ``params[lengths + i]``. Two Gauss-Newton steps on ``|p - x_i| = L_i``; then
+    ``params[lengths + apart * i]``. Two Gauss-Newton steps on ``|p - x_i| = L_i``; then
     ``alpha_i . (v - v_i) = 0``, which rigid cables impose.
     """
     px, py, pz, vx, vy, vz = guess
@@ -30,7 +30,7 @@ def load_from_drones(n, drones, width, memory, lengths, params, guess):  # type:
             scale = 1.0 / max(d, 1e-6)
             ax, ay, az = ax * scale, ay * scale, az * scale
             if sweep < 2:
-                r = params[lengths + i] - d
+                r = params[lengths + apart * i] - d
             else:
                 r = (
                     ax * (memory[o + 3] - vx)

@@ -14,21 +14,35 @@ from colift.control.estimation._cables import load_from_drones
 from colift.control.estimation.base import SIGNATURE, EstimationPart
 from colift.control.tuning import lag_warnings, shorter
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.smooth import decay
-from colift.part import Places, Setup, Vector, carry_rows
+from colift.part import Setup, Vector
 from colift.team import Team
 
 FINEST = 0.5e-3
 """The forecast remembers one acceleration for every so many seconds of the delay, s."""
 
-# Parameters: then gains (3 by 2) and gates (2) of load and drones, masses, cable lengths.
-_DELAY, _TURN, _LAG, _PERIOD, _PATIENCE, _SMOOTH, _GRAVITY, _LOAD_MASS = 0, 1, 2, 3, 4, 5, 6, 7
-_STEADY, _COAST, _LOAD, _DRONES, _HEAD = 8, 9, 10, 18, 26
-# Memory of a body: started; time since its last sample; that sample; its state when the sample was taken:
-# position, velocity, unexplained acceleration; attitude, its last sample and that one's age; thrust that acts;
-# ring of known accelerations.
-_AGE, _SAMPLE, _STATE, _ATTITUDE, _SEEN, _SINCE, _THRUST, _RING = 1, 2, 8, 17, 21, 25, 26, 27
+FILTER = Layout(team={"gain": 6, "gate": 2})
+"""Gain by state (3) and measurement (2); the most that a measurement may surprise with."""
+PARAMS = Layout(
+    team={
+        "delay": 1, "turn": 1, "lag": 1, "period": 1, "patience": 1, "smooth": 1, "g": 1, "m_L": 1,
+        "steady": 1, "coast": 1, "load": FILTER.size(0), "drones": FILTER.size(0), "room": 1,
+    },
+    drone={"m": 1, "L": 1},
+)  # fmt: skip
+"""``turn``: age of the attitudes; ``room``: accelerations that a body's ring has room for."""
+BODY = Layout(
+    team={
+        "started": 1, "age": 1, "sample": 6, "state": 9, "attitude": 4, "seen": 4, "since": 1,
+        "thrust": 1, "ring": None,
+    }
+)  # fmt: skip
+"""``age`` of the last ``sample``; ``state`` when it was taken: position, velocity, unexplained acceleration; the attitude
+``seen`` last, and time ``since`` then; ``thrust`` that acts; ``ring`` of known accelerations."""
+MEMORY = Layout(team={"load": None}, drone={"body": None})
+P, F, B = PARAMS.at, FILTER.at, BODY.at
 
 
 @inline
@@ -38,10 +52,10 @@ def _advance(o, slot, places, dt, ax, ay, az, memory):  # type: ignore[no-untype
     for k in range(3):
         old = known[k]
         if places > 0:
-            ring = o + _RING + 3 * slot + k
+            ring = o + B.ring + 3 * slot + k
             old = memory[ring]
             memory[ring] = known[k]
-        s = o + _STATE + k
+        s = o + B.state + k
         old += memory[s + 6]
         memory[s] += dt * (memory[s + 3] + 0.5 * dt * old)
         memory[s + 3] += dt * old
@@ -50,24 +64,25 @@ def _advance(o, slot, places, dt, ax, ay, az, memory):  # type: ignore[no-untype
 @inline
 def _correct(o, gains, params, memory):  # type: ignore[no-untyped-def]
     """Kalman's correction by the sample, whose surprise counts up to a bound only."""
+    gain, gate = gains + F.gain, gains + F.gate
     for k in range(3):
-        s = o + _STATE + k
-        p = memory[o + _SAMPLE + k] - memory[s]
-        v = memory[o + _SAMPLE + 3 + k] - memory[s + 3]
-        p = min(max(p, -params[gains + 6]), params[gains + 6])
-        v = min(max(v, -params[gains + 7]), params[gains + 7])
+        s = o + B.state + k
+        p = memory[o + B.sample + k] - memory[s]
+        v = memory[o + B.sample + 3 + k] - memory[s + 3]
+        p = min(max(p, -params[gate]), params[gate])
+        v = min(max(v, -params[gate + 1]), params[gate + 1])
         for j in range(3):
-            memory[s + 3 * j] += params[gains + 2 * j] * p + params[gains + 2 * j + 1] * v
+            memory[s + 3 * j] += params[gain + 2 * j] * p + params[gain + 2 * j + 1] * v
 
 
 @inline
 def _forecast(o, slot, places, dt, memory, k):  # type: ignore[no-untyped-def]
     """One axis of position and velocity now: the state moved through all that the ring remembers."""
-    s = o + _STATE + k
+    s = o + B.state + k
     p, v = memory[s], memory[s + 3]
     for j in range(places):
         # The oldest is the one that is replaced next.
-        a = memory[o + _RING + 3 * ((slot + 1 + j) % places) + k] + memory[s + 6]
+        a = memory[o + B.ring + 3 * ((slot + 1 + j) % places) + k] + memory[s + 6]
         p += dt * (v + 0.5 * dt * a)
         v += dt * a
     return p, v
@@ -76,15 +91,15 @@ def _forecast(o, slot, places, dt, memory, k):  # type: ignore[no-untyped-def]
 @inline
 def _sampled(o, row, period, dt, memory, position, velocity):  # type: ignore[no-untyped-def]
     """Whether there is something new from the sensor; if so it becomes the sample."""
-    memory[o + _AGE] += dt
+    memory[o + B.age] += dt
     fresh = False
     for k in range(3):
-        fresh = fresh or position[row, k] != memory[o + _SAMPLE + k]
-    if fresh and memory[o + _AGE] > period - 0.5 * dt:
+        fresh = fresh or position[row, k] != memory[o + B.sample + k]
+    if fresh and memory[o + B.age] > period - 0.5 * dt:
         for k in range(3):
-            memory[o + _SAMPLE + k] = position[row, k]
-            memory[o + _SAMPLE + 3 + k] = velocity[row, k]
-        memory[o + _AGE] = 0.0
+            memory[o + B.sample + k] = position[row, k]
+            memory[o + B.sample + 3 + k] = velocity[row, k]
+        memory[o + B.age] = 0.0
         return True
     return False
 
@@ -92,37 +107,37 @@ def _sampled(o, row, period, dt, memory, position, velocity):  # type: ignore[no
 @inline
 def _start(o, row, position, velocity, memory):  # type: ignore[no-untyped-def]
     """At rest in the mind of the filter: the first measurement is believed."""
-    if memory[o] == 0.0:
-        memory[o] = 1.0
+    if memory[o + B.started] == 0.0:
+        memory[o + B.started] = 1.0
         for k in range(3):
-            memory[o + _SAMPLE + k] = memory[o + _STATE + k] = position[row, k]
-            memory[o + _SAMPLE + 3 + k] = memory[o + _STATE + 3 + k] = velocity[row, k]
+            memory[o + B.sample + k] = memory[o + B.state + k] = position[row, k]
+            memory[o + B.sample + 3 + k] = memory[o + B.state + 3 + k] = velocity[row, k]
 
 
 @inline
 def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-untyped-def]
     """Integrate the measured rate; of a new attitude believe a share of the turn that leads to it."""
-    a = o + _ATTITUDE
-    memory[o + _SINCE] += dt
+    a = o + B.attitude
+    memory[o + B.since] += dt
     # A rate without attitudes beside it has stopped being measured as well.
-    step = dt if memory[o + _SINCE] <= params[_STEADY] + 0.5 * dt else 0.0
+    step = dt if memory[o + B.since] <= params[P.steady] + 0.5 * dt else 0.0
     w, x, y, z = quaternion.turn(
         memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
         rates[i, 0] * step, rates[i, 1] * step, rates[i, 2] * step,
     )  # fmt: skip
     fresh = False
     for k in range(4):
-        fresh = fresh or attitudes[i, k] != memory[o + _SEEN + k]
-        memory[o + _SEEN + k] = attitudes[i, k]
+        fresh = fresh or attitudes[i, k] != memory[o + B.seen + k]
+        memory[o + B.seen + k] = attitudes[i, k]
     if fresh:
         ew, ex, ey, ez = quaternion.multiply(
             w, -x, -y, -z, attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
         )
-        share = 2.0 * memory[o + _SINCE] / (memory[o + _SINCE] + params[_SMOOTH])
+        share = 2.0 * memory[o + B.since] / (memory[o + B.since] + params[P.smooth])
         if ew < 0.0:
             share = -share
         w, x, y, z = quaternion.turn(w, x, y, z, share * ex, share * ey, share * ez)
-        memory[o + _SINCE] = 0.0
+        memory[o + B.since] = 0.0
     scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
     memory[a] = w * scale
     memory[a + 1] = x * scale
@@ -142,45 +157,45 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     estimated_attitudes, estimated_rates = writes.estimated_attitudes, writes.estimated_rates
     n = positions.shape[0]
     # Steps finer than the ring are taken several at once.
-    width = memory.size // (n + 1)
-    room = (width - _RING) // 3
-    steps = round(params[_DELAY] / dt)
+    room = int(params[P.room])
+    width = B.ring + 3 * room
+    steps = round(params[P.delay] / dt)
     stride = max((steps + room - 1) // room, 1)
     if step % stride != 0:
         return
     places = round(steps / stride)
     slot = (step // stride) % max(places, 1)
     dt = dt * stride
-    g, m_L = params[_GRAVITY], params[_LOAD_MASS]
-    keep = decay(dt, params[_LAG])
+    g, m_L = params[P.g], params[P.m_L]
+    keep = decay(dt, params[P.lag])
     px = py = pz = 0.0
     for i in range(n):
-        o = width * (1 + i)
-        m = params[_HEAD + i]
-        if memory[o] == 0.0:
-            memory[o + _THRUST] = thrusts[i]
+        o = width * (1 + i)  # the load comes first
+        m = params[P.rows + P.width * i + P.m]
+        if memory[o + B.started] == 0.0:
+            memory[o + B.thrust] = thrusts[i]
             for k in range(4):
-                memory[o + _ATTITUDE + k] = memory[o + _SEEN + k] = attitudes[i, k]
+                memory[o + B.attitude + k] = memory[o + B.seen + k] = attitudes[i, k]
         _start(o, i, positions, velocities, memory)
-        memory[o + _THRUST] = keep * memory[o + _THRUST] + (1.0 - keep) * thrusts[i]
-        coasting = memory[o + _AGE] <= params[_COAST]
-        fresh = _sampled(o, i, params[_PERIOD], dt, memory, positions, velocities)
+        memory[o + B.thrust] = keep * memory[o + B.thrust] + (1.0 - keep) * thrusts[i]
+        coasting = memory[o + B.age] <= params[P.coast]
+        fresh = _sampled(o, i, params[P.period], dt, memory, positions, velocities)
         if fresh and not coasting:
-            memory[o] = 0.0
+            memory[o + B.started] = 0.0
             _start(o, i, positions, velocities, memory)
         _attitude(o, i, dt, attitudes, rates, params, memory)
-        turn, a = params[_TURN], o + _ATTITUDE
+        turn, a = params[P.turn], o + B.attitude
         qw, qx, qy, qz = quaternion.turn(
             memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
             rates[i, 0] * turn, rates[i, 1] * turn, rates[i, 2] * turn,
         )  # fmt: skip
         ux, uy, uz = quaternion.third_axis(qw, qx, qy, qz)
-        f, T = memory[o + _THRUST] / m, tensions[i]
+        f, T = memory[o + B.thrust] / m, tensions[i]
         cx, cy, cz = T * directions[i, 0], T * directions[i, 1], T * directions[i, 2]
         px, py, pz = px + cx, py + cy, pz + cz
         _advance(o, slot, places, dt, f * ux + cx / m, f * uy + cy / m, f * uz + cz / m - g, memory)
         if fresh:
-            _correct(o, _DRONES, params, memory)
+            _correct(o, P.drones, params, memory)
         for k in range(4):
             estimated_attitudes[i, k] = memory[a + k]
         for k in range(3):
@@ -193,19 +208,19 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             estimated_velocities[i, k] = v
     _start(0, 0, load[0:1], load[1:2], memory)
     _advance(0, slot, places, dt, -px / m_L, -py / m_L, -pz / m_L - g, memory)
-    tracked = _sampled(0, 0, params[_PERIOD], dt, memory, load[0:1], load[1:2])
-    s = _STATE
-    if not tracked and memory[_AGE] > params[_PATIENCE] + params[_PERIOD]:
+    tracked = _sampled(0, 0, params[P.period], dt, memory, load[0:1], load[1:2])
+    s = B.state
+    if not tracked and memory[B.age] > params[P.patience] + params[P.period]:
         guess = (
             memory[s], memory[s + 1], memory[s + 2], memory[s + 3], memory[s + 4], memory[s + 5]
         )  # fmt: skip
-        found = load_from_drones(n, width + s, width, memory, _HEAD + n, params, guess)
+        found = load_from_drones(n, width + s, width, memory, P.rows + P.L, P.width, params, guess)
         for k in range(6):
-            memory[_SAMPLE + k] = found[k]
-        memory[_AGE] = params[_PATIENCE]
+            memory[B.sample + k] = found[k]
+        memory[B.age] = params[P.patience]
         tracked = True
     if tracked:
-        _correct(0, _LOAD, params, memory)
+        _correct(0, P.load, params, memory)
     for k in range(3):
         p, v = _forecast(0, slot, places, dt, memory, k)
         estimated_load[0, k] = p
@@ -252,6 +267,7 @@ class Predictor(EstimationPart):
     """
 
     kernel = _predict
+    remembers = MEMORY
 
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
     """Age of the measured positions and velocities, s."""
@@ -294,22 +310,23 @@ class Predictor(EstimationPart):
 
     def params(self, team: Team) -> Vector:
         patience = self.patience if self.load_from == "sensor" else -1.0
-        head = [self.delay, self.attitude_delay, self.lag, self.period, patience]
-        head += [self.attitude_filter, team.gravity, team.load_mass, self.steady, self.coast]
-        for noise in (
-            (self.load_position_noise, self.load_velocity_noise),
-            (self.position_noise, self.velocity_noise),
-        ):
-            gains, surprise = steady_gains(self.period, *noise, self.unexplained)
-            head += [*gains.ravel(), *(self.gate * surprise)]
-        return np.concatenate([head, team.masses, team.cable_lengths])
+        return PARAMS.pack(
+            team.n, delay=self.delay, turn=self.attitude_delay, lag=self.lag, period=self.period,
+            patience=patience, smooth=self.attitude_filter, g=team.gravity, m_L=team.load_mass,
+            steady=self.steady, coast=self.coast, room=self._room, m=team.masses,
+            L=team.cable_lengths,
+            load=self._filter(self.load_position_noise, self.load_velocity_noise),
+            drones=self._filter(self.position_noise, self.velocity_noise),
+        )  # fmt: skip
 
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(self._width * (team.n + 1))
+    def _filter(self, position: float, velocity: float) -> Vector:
+        gain, surprise = steady_gains(self.period, position, velocity, self.unexplained)
+        return FILTER.pack(0, gain=gain.ravel(), gate=self.gate * surprise)
 
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, self._width, self._width, places)
+    def layout(self) -> Layout:
+        width = BODY.filled(ring=3 * self._room).size(0)
+        return MEMORY.filled(load=width, body=width)
 
     @property
-    def _width(self) -> int:
-        return _RING + 3 * (math.ceil(self.delay / FINEST) + 1)
+    def _room(self) -> int:
+        return math.ceil(self.delay / FINEST) + 1

@@ -5,20 +5,26 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import fifo, noise
-from colift.part import Places, Vector, carry_rows, timing_problems
+from colift.part import Vector, timing_problems
 from colift.team import Team
 from colift.world.link.base import SIGNATURE, LinkPart
 
 Delay = Annotated[float, Field(ge=0.0, le=2.0)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
-_HEAD = 4  # params before the drones' losses: period, delay, jitter, slots
-_WIDTH = 4  # numbers in a packet: tension, direction
+PARAMS = Layout(
+    team={"period": 1, "delay": 1, "jitter": 1, "slots": 1, "row": 1}, drone={"loss": 1}
+)
+"""``slots``: packets that may be on their way to a drone; ``row``: length of a drone's row in memory."""
+PACKET = Layout(team={"tension": 1, "direction": 3})
+MEMORY = Layout(drone={"started": 1, "packets": None})
+P, K, M = PARAMS.at, PACKET.at, MEMORY.at
+_WIDTH = PACKET.size(0)
 
 
 @kernel(SIGNATURE)
@@ -26,30 +32,30 @@ def _transmit(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     step, key, dt = now.step, now.key, now.dt
     tensions, directions = sees.desired_tensions, sees.desired_directions
     received_tensions, received_directions = writes.received_tensions, writes.received_directions
-    slots = int(params[3])
-    row = 1 + fifo.size(slots, _WIDTH)
-    every = max(1, int(params[0] / dt + 0.5))
+    slots, row = int(params[P.slots]), int(params[P.row])
+    every = max(1, int(params[P.period] / dt + 0.5))
     due, number = step % every == 0, step // every
     for i in range(tensions.shape[0]):
-        o = row * i
+        o = M.rows + row * i
+        queue = o + M.packets
         at = -1
-        if memory[o] == 0.0:
-            memory[o] = 1.0
-            at = fifo.post(memory, o + 1, slots, _WIDTH, step)
+        if memory[o + M.started] == 0.0:
+            memory[o + M.started] = 1.0
+            at = fifo.post(memory, queue, slots, _WIDTH, step)
         elif due:
             luck, late = noise.uniforms(key, number, i)
-            if luck >= params[_HEAD + i]:
-                delay = params[1] + params[2] * late
-                at = fifo.post(memory, o + 1, slots, _WIDTH, step + int(delay / dt + 0.5))
+            if luck >= params[P.rows + P.width * i + P.loss]:
+                delay = params[P.delay] + params[P.jitter] * late
+                at = fifo.post(memory, queue, slots, _WIDTH, step + int(delay / dt + 0.5))
         if at >= 0:
-            memory[at] = tensions[i]
+            memory[at + K.tension] = tensions[i]
             for k in range(3):
-                memory[at + 1 + k] = directions[i, k]
-        at = fifo.fetch(memory, o + 1, slots, _WIDTH, step)
+                memory[at + K.direction + k] = directions[i, k]
+        at = fifo.fetch(memory, queue, slots, _WIDTH, step)
         if at >= 0:
-            received_tensions[i] = memory[at]
+            received_tensions[i] = memory[at + K.tension]
             for k in range(3):
-                received_directions[i, k] = memory[at + 1 + k]
+                received_directions[i, k] = memory[at + K.direction + k]
 
 
 class Radio(LinkPart):
@@ -61,6 +67,7 @@ class Radio(LinkPart):
     """
 
     kernel = _transmit
+    remembers = MEMORY
     per_drone = ("loss",)
 
     period: Annotated[float, Field(ge=1e-5, le=10.0)] = 0.01
@@ -81,11 +88,10 @@ class Radio(LinkPart):
         return timing_problems(step, duration, {"period": self.period}, delays)
 
     def params(self, team: Team) -> Vector:
-        losses = np.broadcast_to(np.asarray(self.loss, dtype=float), team.n)
-        return np.array([self.period, self.delay, self.jitter, self._slots, *losses])
+        return PARAMS.pack(
+            team.n, period=self.period, delay=self.delay, jitter=self.jitter, slots=self._slots,
+            row=self.layout().at.width, loss=self.loss,
+        )  # fmt: skip
 
-    def memory(self, team: Team) -> Vector:
-        return np.zeros((1 + int(fifo.size(self._slots, _WIDTH))) * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, 0, 1 + int(fifo.size(self._slots, _WIDTH)), places)
+    def layout(self) -> Layout:
+        return MEMORY.filled(packets=int(fifo.size(self._slots, _WIDTH)))

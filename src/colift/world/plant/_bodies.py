@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
-from colift.part import Places, Vector, carry_rows
+from colift.part import Places, Vector
 from colift.team import Team
 from colift.team.geometry import min_norm_tensions
 from colift.world.plant.base import OBSERVE_SIGNATURE, STATE, PlantPart, Start
@@ -184,4 +184,4 @@ class BodiesPart(PlantPart):
         # A new drone joins the load where it is by now, not where it was when last observed.
         joining = fresh[LOAD : state_size(places.size)].reshape(places.size, DRONE)
         joining[:, :LOAD] += old[:LOAD] - fresh[:LOAD]
-        return carry_rows(old, fresh, LOAD, DRONE, places)
+        return STATE.carry_over(old, fresh, places)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
 from colift.kernel.math import fifo, noise, quaternion
-from colift.part import Places, Vector, carry_rows, timing_problems
+from colift.part import Vector, timing_problems
 from colift.team import Team
 from colift.world.sensing.base import SIGNATURE, SensingPart
 
@@ -22,39 +22,61 @@ Delay = Annotated[float, Field(ge=0.0, le=2.0)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Period = Annotated[float, Field(ge=1e-5, le=1.0)]
 
-_SENSORS = {"load": 6, "tracking": 6, "attitude": 4, "rates": 3}  # numbers in one sample
+_WIDTHS = {"load": 6, "tracking": 6, "attitude": 4, "rates": 3}  # numbers in one sample
 _QUANTITIES = ("load_position", "load_velocity", "position", "velocity", "attitude", "rates")
 _CHANNELS = 16  # of random numbers per body: 0-6 the noise, two axes in each; 7-10 dropouts
-_TURNING, _SPINNING, _LOSING = (
-    3,
-    5,
-    7,
-)  # the first of attitude, rates and dropouts; tracking has 0-2
+_TURNING, _SPINNING = 3, 5  # the first of attitude and rates; tracking has 0-2
+_LOAD_LOST, _TRACKING_LOST, _ATTITUDE_LOST, _RATES_LOST = 7, 8, 9, 10
 
-# params: period, delay, dropout, slots of each sensor; noise, spread of bias, bias (3) of each quantity.
-_SENSOR, _QUANTITY = 4, 5
-_FIRST = _SENSOR * len(_SENSORS)
+SENSOR = Layout(team={"period": 1, "delay": 1, "dropout": 1, "slots": 1, "samples": 1})
+"""``slots``: samples that may be on their way; ``samples``: where they stand, as in :data:`MEMORY`."""
+QUANTITY = Layout(team={"noise": 1, "spread": 1, "bias": 3})
+"""``bias`` has a part that is given and one that is drawn with the deviation ``spread``."""
+PARAMS = Layout(
+    team={
+        **{f"{name}_sensor": SENSOR.size(0) for name in _WIDTHS},
+        **{f"{name}_error": QUANTITY.size(0) for name in _QUANTITIES},
+        "first_row": 1, "row": 1,
+    }
+)  # fmt: skip
+"""``first_row`` and ``row``: begin and length of the drones' rows in memory."""
+MEMORY = Layout(
+    team={"load_started": 1, "load_bias": 6, "load_samples": None},
+    drone={
+        "started": 1, "bias": 12, "tracking_samples": None, "attitude_samples": None,
+        "rates_samples": None,
+    },
+)  # fmt: skip
+P, S, Q, M = PARAMS.at, SENSOR.at, QUANTITY.at, MEMORY.at
+_NEXT = QUANTITY.size(0)  # from one quantity's numbers to those of the next
 
 
 @inline
-def _place(fresh, step, dt, key, channel, params, sensor, memory, o, width):  # type: ignore[no-untyped-def]
+def _place(fresh, step, dt, key, lost, params, sensor, memory, o, width):  # type: ignore[no-untyped-def]
     """Place and number of a sensor's sample; the place is -1 if none is taken at this step or it is lost.
 
-    The first sample of all arrives at once: bodies were at rest before. Its number is below -1, that of the bias.
+    ``o`` is where the body's memory begins, ``lost`` the channel that decides on losses. The first sample of all arrives
+    at once: bodies were at rest before. Its number is below -1, that of the bias.
     """
-    s = _SENSOR * sensor
-    slots, every = int(params[s + 3]), max(1, int(params[s] / dt + 0.5))
+    queue, slots = o + int(params[sensor + S.samples]), int(params[sensor + S.slots])
+    every = max(1, int(params[sensor + S.period] / dt + 0.5))
     number = step // every
     if fresh:
-        return fifo.post(memory, o, slots, width, step), -2 - number
+        return fifo.post(memory, queue, slots, width, step), -2 - number
     if step % every != 0:
         return -1, number
-    if (
-        params[s + 2] > 0.0
-        and noise.uniform(key, number, channel + _LOSING + sensor) < params[s + 2]
-    ):
+    dropout = params[sensor + S.dropout]
+    if dropout > 0.0 and noise.uniform(key, number, lost) < dropout:
         return -1, number
-    return fifo.post(memory, o, slots, width, step + int(params[s + 1] / dt + 0.5)), number
+    due = step + int(params[sensor + S.delay] / dt + 0.5)
+    return fifo.post(memory, queue, slots, width, due), number
+
+
+@inline
+def _arrived(step, params, sensor, memory, o, width):  # type: ignore[no-untyped-def]
+    """Place of the newest of a sensor's samples that has arrived, or -1."""
+    queue, slots = o + int(params[sensor + S.samples]), int(params[sensor + S.slots])
+    return fifo.fetch(memory, queue, slots, width, step)
 
 
 @inline
@@ -63,18 +85,17 @@ def _disturb(memory, at, width, key, number, channel, params, size):  # type: ig
     for c in range((width + 1) // 2):
         a, b = noise.normals(key, number, channel + c)
         m = 2 * c
-        memory[at + m] += params[size + _QUANTITY * (m // 3)] * a
+        memory[at + m] += params[size + _NEXT * (m // 3)] * a
         if m + 1 < width:
-            memory[at + m + 1] += params[size + _QUANTITY * ((m + 1) // 3)] * b
+            memory[at + m + 1] += params[size + _NEXT * ((m + 1) // 3)] * b
 
 
 @inline
 def _draw_biases(memory, o, width, key, channel, params, quantity):  # type: ignore[no-untyped-def]
     """The biases of the quantities from the given one on."""
-    q = _FIRST + _QUANTITY * quantity
     for m in range(width):
-        memory[o + m] = params[q + _QUANTITY * (m // 3) + 2 + m % 3]
-    _disturb(memory, o, width, key, -1, channel, params, q + 1)
+        memory[o + m] = params[quantity + _NEXT * (m // 3) + Q.bias + m % 3]
+    _disturb(memory, o, width, key, -1, channel, params, quantity + Q.spread)
 
 
 @kernel(SIGNATURE)
@@ -86,53 +107,53 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     measured_velocities, measured_attitudes = writes.measured_velocities, writes.measured_attitudes
     measured_rates = writes.measured_rates
     n = positions.shape[0]
-    # Load, then each drone: started; biases (6 or 12); queues. A drone's noise is body i + 1's.
-    fresh = memory[0] == 0.0
+    # The load's noise is that of body 0, a drone's that of body i + 1.
+    fresh = memory[M.load_started] == 0.0
     if fresh:
-        memory[0] = 1.0
-        _draw_biases(memory, 1, 6, key, 0, params, 0)
-    at, number = _place(fresh, step, dt, key, 0, params, 0, memory, 7, 6)
+        memory[M.load_started] = 1.0
+        _draw_biases(memory, M.load_bias, 6, key, 0, params, P.load_position_error)
+    at, number = _place(fresh, step, dt, key, _LOAD_LOST, params, P.load_sensor, memory, 0, 6)
     if at >= 0:
         for k in range(3):
-            memory[at + k] = load[0, k] + memory[1 + k]
-            memory[at + 3 + k] = load[1, k] + memory[4 + k]
-        _disturb(memory, at, 6, key, number, 0, params, _FIRST)
-    at = fifo.fetch(memory, 7, int(params[3]), 6, step)
+            memory[at + k] = load[0, k] + memory[M.load_bias + k]
+            memory[at + 3 + k] = load[1, k] + memory[M.load_bias + 3 + k]
+        _disturb(memory, at, 6, key, number, 0, params, P.load_position_error + Q.noise)
+    at = _arrived(step, params, P.load_sensor, memory, 0, 6)
     if at >= 0 and stuck[n] == 0.0:
         for k in range(3):
             measured_load[0, k] = memory[at + k]
             measured_load[1, k] = memory[at + 3 + k]
 
-    head = 7 + fifo.size(int(params[3]), 6)
-    tracking = 13
-    turning = tracking + fifo.size(int(params[7]), 6)
-    spinning = turning + fifo.size(int(params[11]), 4)
-    row = spinning + fifo.size(int(params[15]), 3)
+    first, row = int(params[P.first_row]), int(params[P.row])
     for i in range(n):
-        o = head + row * i
-        channel = _CHANNELS * (i + 1)
-        fresh = memory[o] == 0.0
+        o = first + row * i
+        bias, channel = o + M.bias, _CHANNELS * (i + 1)
+        fresh = memory[o + M.started] == 0.0
         if fresh:
-            memory[o] = 1.0
-            _draw_biases(memory, o + 1, 12, key, channel, params, 2)
+            memory[o + M.started] = 1.0
+            _draw_biases(memory, bias, 12, key, channel, params, P.position_error)
 
-        at, number = _place(fresh, step, dt, key, channel, params, 1, memory, o + tracking, 6)
+        sensor, lost = P.tracking_sensor, channel + _TRACKING_LOST
+        at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 6)
         if at >= 0:
             for k in range(3):
-                memory[at + k] = positions[i, k] + memory[o + 1 + k]
-                memory[at + 3 + k] = velocities[i, k] + memory[o + 4 + k]
-            _disturb(memory, at, 6, key, number, channel, params, _FIRST + 2 * _QUANTITY)
-        at = fifo.fetch(memory, o + tracking, int(params[7]), 6, step)
+                memory[at + k] = positions[i, k] + memory[bias + k]
+                memory[at + 3 + k] = velocities[i, k] + memory[bias + 3 + k]
+            _disturb(memory, at, 6, key, number, channel, params, P.position_error + Q.noise)
+        at = _arrived(step, params, sensor, memory, o, 6)
         if at >= 0 and stuck[i] == 0.0:
             for k in range(3):
                 measured_positions[i, k] = memory[at + k]
                 measured_velocities[i, k] = memory[at + 3 + k]
 
-        at, number = _place(fresh, step, dt, key, channel, params, 2, memory, o + turning, 4)
+        sensor, lost = P.attitude_sensor, channel + _ATTITUDE_LOST
+        at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 4)
         if at >= 0:
             for k in range(3):
-                memory[at + k] = memory[o + 7 + k]
-            _disturb(memory, at, 3, key, number, channel + _TURNING, params, _FIRST + 4 * _QUANTITY)
+                memory[at + k] = memory[bias + 6 + k]
+            _disturb(
+                memory, at, 3, key, number, channel + _TURNING, params, P.attitude_error + Q.noise
+            )
             x, y, z = 0.5 * memory[at], 0.5 * memory[at + 1], 0.5 * memory[at + 2]
             angle = math.sqrt(x * x + y * y + z * z)
             sine = math.sin(angle) / angle if angle > 0.0 else 1.0
@@ -142,19 +163,20 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             )  # fmt: skip
             for k in range(4):
                 memory[at + k] = turned[k]
-        at = fifo.fetch(memory, o + turning, int(params[11]), 4, step)
+        at = _arrived(step, params, sensor, memory, o, 4)
         if at >= 0 and stuck[i] == 0.0:
             for k in range(4):
                 measured_attitudes[i, k] = memory[at + k]
 
-        at, number = _place(fresh, step, dt, key, channel, params, 3, memory, o + spinning, 3)
+        sensor, lost = P.rates_sensor, channel + _RATES_LOST
+        at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 3)
         if at >= 0:
             for k in range(3):
-                memory[at + k] = rates[i, k] + memory[o + 10 + k]
+                memory[at + k] = rates[i, k] + memory[bias + 9 + k]
             _disturb(
-                memory, at, 3, key, number, channel + _SPINNING, params, _FIRST + 5 * _QUANTITY
+                memory, at, 3, key, number, channel + _SPINNING, params, P.rates_error + Q.noise
             )
-        at = fifo.fetch(memory, o + spinning, int(params[15]), 3, step)
+        at = _arrived(step, params, sensor, memory, o, 3)
         if at >= 0 and stuck[i] == 0.0:
             for k in range(3):
                 measured_rates[i, k] = memory[at + k]
@@ -175,6 +197,7 @@ class Noisy(SensingPart):
     """
 
     kernel = _sense
+    remembers = MEMORY
 
     load_position_noise: Size = 0.001
     """m."""
@@ -232,10 +255,15 @@ class Noisy(SensingPart):
         return math.ceil(delay / period) + 2
 
     def params(self, team: Team) -> Vector:
-        packed: list[float] = []
-        for sensor in _SENSORS:
-            timing = [getattr(self, f"{sensor}_{name}") for name in ("period", "delay", "dropout")]
-            packed += [*timing, self._slots(sensor)]
+        where, packed = self.layout().at, {}
+        for sensor in _WIDTHS:
+            timing = {
+                name: getattr(self, f"{sensor}_{name}") for name in ("period", "delay", "dropout")
+            }
+            samples = getattr(where, f"{sensor}_samples")
+            packed[f"{sensor}_sensor"] = SENSOR.pack(
+                0, **timing, slots=self._slots(sensor), samples=samples
+            )
         for quantity in _QUANTITIES:
             bias = getattr(self, f"{quantity}_bias")
             spread, fixed = (0.0, bias) if isinstance(bias, tuple) else (bias, (0.0, 0.0, 0.0))
@@ -243,25 +271,17 @@ class Noisy(SensingPart):
                 size = math.radians(self.attitude_noise_deg)
             else:
                 size = getattr(self, f"{quantity}_noise")
-            packed += [size, spread, *fixed]
-        return np.array(packed)
+            packed[f"{quantity}_error"] = QUANTITY.pack(0, noise=size, spread=spread, bias=fixed)
+        return PARAMS.pack(team.n, first_row=where.rows, row=where.width, **packed)
 
-    def _sizes(self) -> tuple[int, int]:
-        """Numbers in memory for the load, and for each drone."""
-        queues = [int(fifo.size(self._slots(name), width)) for name, width in _SENSORS.items()]
-        return 7 + queues[0], 13 + sum(queues[1:])
-
-    def memory(self, team: Team) -> Vector:
-        head, row = self._sizes()
-        return np.zeros(head + row * team.n)
-
-    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        return carry_rows(old, fresh, *self._sizes(), places)
+    def layout(self) -> Layout:
+        queues = {name: fifo.size(self._slots(name), width) for name, width in _WIDTHS.items()}
+        return MEMORY.filled(**{f"{name}_samples": int(size) for name, size in queues.items()})
 
     def delays(self) -> dict[str, float]:
-        return {name: float(getattr(self, f"{name}_delay")) for name in _SENSORS}
+        return {name: float(getattr(self, f"{name}_delay")) for name in _WIDTHS}
 
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
-        periods = {f"{name}_period": getattr(self, f"{name}_period") for name in _SENSORS}
-        delays = {f"{name}_delay": getattr(self, f"{name}_delay") for name in _SENSORS}
+        periods = {f"{name}_period": getattr(self, f"{name}_period") for name in _WIDTHS}
+        delays = {f"{name}_delay": getattr(self, f"{name}_delay") for name in _WIDTHS}
         return timing_problems(step, duration, periods, delays)
