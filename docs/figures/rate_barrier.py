@@ -29,7 +29,7 @@ def tension(n, dt, changes, part_of_barrier):
     allocator = Allocator(safe.model_copy(update=changes), team, dt=dt)
     least = np.radians(safe.min_angle_deg + 1.0)
     allocator.reset(safety.spread_formation(n, np.radians(safety.CONES[n]), least))
-    allocator._params[cycle.KAPPA_RATE] *= part_of_barrier
+    allocator._params[cycle.PARAMS.at.kappa_rate] *= part_of_barrier
     for _ in range(round(AT_REST / dt)):
         answer = allocator.allocate([0.0, 0.0, team.load_mass * team.gravity])
     rest = answer.tensions.sum()

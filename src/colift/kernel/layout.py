@@ -17,6 +17,11 @@ A size that depends on settings stays open::
     MEMORY.filled(queue=20)            # of these settings
 
 Compiled code knows the places up to there; it is told any further ones, such as ``width``, as parameters.
+
+Where a function wants a field of all drones in one piece, the rows are taken as columns, and one field stands after the
+other. It is for the kernel to choose, by :func:`colift.kernel.math.columns.column`::
+
+    alpha = column(memory, M.rows, n, MEMORY.spans.alpha)
 """
 
 from __future__ import annotations
@@ -47,6 +52,8 @@ class Layout:
     at : named tuple of int
         By name the first place of a field: in the vector for the team's, in its row for a drone's. ``at.rows`` is where the
         first row begins, ``at.width`` the length of a row. What stands behind an open size is missing.
+    spans : named tuple of (int, int)
+        By name place and size of a field, for a column of it; of fields whose size is known.
 
     """
 
@@ -59,15 +66,18 @@ class Layout:
         self._sizes = {
             name: size for name, size in {**self.team, **self.drone}.items() if size is not None
         }
-        places: dict[str, int] = {}
+        places: list[tuple[str, int]] = []
         for fields, end in ((self.team, "rows"), (self.drone, "width")):
             place = 0
             for name in [*fields, end]:
-                places[name] = place
+                places.append((name, place))
                 if name in fields and name not in self._sizes:
                     break
                 place += self._sizes.get(name, 0)
-        self.at: Any = named_tuple("Places", places, __name__)(*places.values())
+        names, begins = zip(*places, strict=True)
+        self.at: Any = named_tuple("Places", names, __name__)(*begins)
+        spans = {name: (place, self._sizes[name]) for name, place in places if name in self._sizes}
+        self.spans: Any = named_tuple("Spans", spans, __name__)(*spans.values())
 
     def filled(self, **sizes: int) -> Layout:
         """The same with these sizes for those that are open."""

@@ -12,6 +12,7 @@ import numpy as np
 from colift.control.allocation.common.oracle import (
     Limits,
     Oracle,
+    P,
     TensionProblem,
     beyond_saddles,
     outcome_of,
@@ -19,8 +20,14 @@ from colift.control.allocation.common.oracle import (
 )
 from colift.control.allocation.common.plain import Outcome, Problem, plain_kernel
 from colift.interrupts import heard
+from colift.kernel.layout import Layout
 from colift.part import Vector
 from colift.team import Team
+
+MEMORY = Layout(team={"warm": 1}, drone={"bounds": 4})
+"""Whether there are multipliers of the last answer, and those of the bounds; those of the constraints follow. A team that
+changes starts anew."""
+M = MEMORY.at
 
 SHARPER = 1e-3
 """IPOPT's tolerance, which is on its scaled problem, relative to the part's."""
@@ -112,11 +119,11 @@ def _solve(problem: Problem) -> Outcome:
 def _answer(problem: Problem) -> Outcome:
     asked = tension_problem(problem)
     n, memory = asked.n, problem.memory
-    tolerance, most = float(problem.params[1]), int(problem.params[2])
+    tolerance, most = float(problem.params[P.tolerance]), int(problem.params[P.iterations])
     z = np.concatenate([problem.shares, problem.directions.ravel()])
-    size = len(constraint_bounds(n, asked.limits)[0])
-    lam_x, lam_g = memory[1 : 1 + 4 * n], memory[1 + 4 * n : 1 + 4 * n + size]
-    warm = (lam_x, lam_g) if memory[0] > 0.0 else None
+    size, end = len(constraint_bounds(n, asked.limits)[0]), MEMORY.size(n)
+    lam_x, lam_g = memory[M.rows : end], memory[end : end + size]
+    warm = (lam_x, lam_g) if memory[M.warm] > 0.0 else None
     answer, account = minimise(asked, z, SHARPER * tolerance, most, warm)
     iterations = int(account["iter_count"])
     if not account["success"] and warm is not None:
@@ -129,7 +136,7 @@ def _answer(problem: Problem) -> Outcome:
         return answer["x"].full().ravel(), int(account["iter_count"])
 
     z, further = beyond_saddles(asked, answer["x"].full().ravel(), tolerance, solve)
-    memory[0] = float(account["success"] and np.array_equal(z, answer["x"].full().ravel()))
+    memory[M.warm] = float(account["success"] and np.array_equal(z, answer["x"].full().ravel()))
     lam_x[:], lam_g[:] = (answer[name].full().ravel() for name in ("lam_x", "lam_g"))
     return outcome_of(asked, z, tolerance, iterations + further)
 
@@ -149,5 +156,5 @@ class Ipopt(Oracle):
     needs = ("casadi", "ipopt")
 
     def memory(self, team: Team) -> Vector:
-        n = team.n
-        return np.zeros(1 + 4 * n + 3 + 2 * n + n * (n - 1) // 2)
+        most = constraint_bounds(team.n, Limits(cosine_max=0.0, height_max=0.0))[0].size
+        return np.zeros(MEMORY.size(team.n) + most)

@@ -27,6 +27,8 @@ from colift.control.allocation.limits import feasibility as feasible
 from colift.control.allocation.paper import newton as paper
 from colift.errors import Problem, SettingError
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array, pairwise_angles, ring, widest_gap
@@ -39,6 +41,19 @@ _RECOVERING = int(Status.RECOVERING)
 """Where ``info`` has a sixth place: which kinds of limits push, one bit each in the order of
 :mod:`colift.control.allocation.limits.newton`; 64 stands for the pairs."""
 
+MEMORY = Layout(
+    team={"S": newton.SYSTEM, "lam": 3, "M": 6, "facing": 3, "yielded": 1, "asked": 3},
+    drone={
+        "data": newton.DATA, "T": 1, "alpha": 3, "start": 3, "w": 3, "dw": 3, "w_new": 3,
+        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1,
+    },
+)  # fmt: skip
+"""In columns; those of every limit, of every pair, and the matrix ``K`` follow. A team that changes starts anew."""
+LIMIT = Layout(drone={"g": 1, "g_new": 1, "z": 1})
+PAIR = Layout(drone={"kappa": 1, "cos_max": 1, "both": 2})
+C, L, N, P = MEMORY.at, LIMIT.at, PAIR.at, cycle.PARAMS.at
+CABLES, LIMITS, PAIRS = MEMORY.spans, LIMIT.spans, PAIR.spans
+
 
 @kernel(SIGNATURE)
 def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
@@ -49,49 +64,33 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     n = tensions.shape[0]
     most = n * (n - 1) // 2
     count = newton.LIMITS * n + most
-    o = 0
-    data = memory[o : o + newton.DATA * n]
-    o += newton.DATA * n
-    T = memory[o : o + n]
-    o += n
-    alpha = memory[o : o + 3 * n]
-    o += 3 * n
-    start = memory[o : o + 3 * n]
-    o += 3 * n
-    w = memory[o : o + 3 * n]
-    o += 3 * n
-    dw = memory[o : o + 3 * n]
-    o += 3 * n
-    w_new = memory[o : o + 3 * n]
-    o += 3 * n
-    g = memory[o : o + count]
-    o += count
-    g_new = memory[o : o + count]
-    o += count
-    z = memory[o : o + count]
-    o += count
-    kappa_pair = memory[o : o + most]
-    o += most
-    cos_max = memory[o : o + most]
-    o += most
-    rows = memory[o : o + newton.ROW * n]
-    o += newton.ROW * n
-    K = memory[o : o + 4 * n * n]
-    o += 4 * n * n
-    Y = memory[o : o + 2 * n * newton.RHS]
-    o += 2 * n * newton.RHS
-    S = memory[o : o + newton.SYSTEM]
-    o += newton.SYSTEM
-    lam = memory[o : o + 3]
-    M = memory[o + 3 : o + 9]
-    facing = memory[o + 9 : o + 12]
-    yielded = memory[o + 12 : o + 13]
-    asked = memory[o + 13 : o + 16]
-    o += 16
-    integers = memory[o : o + 2 * n + 2 * most].view(np.int64)
-    order = integers[:n]
-    first = integers[n : 2 * n]
-    pairs = integers[2 * n :]
+    limits = C.rows + C.width * n
+    near = limits + L.width * count
+    square = near + N.width * most
+    data = column(memory, C.rows, n, CABLES.data)
+    T = column(memory, C.rows, n, CABLES.T)
+    alpha = column(memory, C.rows, n, CABLES.alpha)
+    start = column(memory, C.rows, n, CABLES.start)
+    w = column(memory, C.rows, n, CABLES.w)
+    dw = column(memory, C.rows, n, CABLES.dw)
+    w_new = column(memory, C.rows, n, CABLES.w_new)
+    rows = column(memory, C.rows, n, CABLES.row)
+    Y = column(memory, C.rows, n, CABLES.Y)
+    order = column(memory, C.rows, n, CABLES.order)
+    first = column(memory, C.rows, n, CABLES.first)
+    g = column(memory, limits, count, LIMITS.g)
+    g_new = column(memory, limits, count, LIMITS.g_new)
+    z = column(memory, limits, count, LIMITS.z)
+    kappa_pair = column(memory, near, most, PAIRS.kappa)
+    cos_max = column(memory, near, most, PAIRS.cos_max)
+    pairs = column(memory, near, most, PAIRS.both)
+    K = memory[square : square + 4 * n * n]
+    S = column(memory, 0, 1, CABLES.S)
+    lam = column(memory, 0, 1, CABLES.lam)
+    M = column(memory, 0, 1, CABLES.M)
+    facing = column(memory, 0, 1, CABLES.facing)
+    yielded = column(memory, 0, 1, CABLES.yielded)
+    asked = column(memory, 0, 1, CABLES.asked)
 
     for k in range(info.shape[0]):
         info[k] = 0.0
@@ -102,20 +101,20 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         info[INFO_OBJECTIVE] = math.nan
         info[INFO_BALANCE] = math.nan
         return _INVALID_FORCE
-    sigma = params[cycle.SIGMA]
+    sigma = params[P.sigma]
     unit = 1.0 / sigma
     # More than all cables can give changes nothing but the numbers' size.
-    most_force = 2.0 * params[cycle.TOTAL]
+    most_force = 2.0 * params[P.total]
     fx = min(max(fx, -most_force), most_force) * unit
     fy = min(max(fy, -most_force), most_force) * unit
     fz = min(max(fz, -most_force), most_force) * unit
     W = math.sqrt(fx * fx + fy * fy + fz * fz)
-    mu = params[cycle.MU] * unit * unit
-    if params[cycle.MU_SCALED] != 0.0:
-        mu *= (W * sigma / params[cycle.MU_FORCE]) ** 2
+    mu = params[P.mu] * unit * unit
+    if params[P.mu_scaled] != 0.0:
+        mu *= (W * sigma / params[P.mu_force]) ** 2
     period = dt if dt > 1e-6 else 1e-6
-    delta = min(params[cycle.MAX_RATE] * period, cycle.MAX_TURN)
-    rho = params[cycle.SETTLING] / period
+    delta = min(params[P.max_rate] * period, cycle.MAX_TURN)
+    rho = params[P.settling] / period
 
     cycle.sort_cables(n, directions, order)
     relaxed = cycle.set_up(
@@ -135,13 +134,13 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         w,
     )
     if W > 1e-6 and not relaxed:
-        follow = period / (params[cycle.TURNING] + period)
+        follow = period / (params[P.turning] + period)
         cycle.turn_home(n, fx, fy, fz, W, follow, cycle.TURN * delta, data, facing, w_new, dw)
     m = cycle.near_pairs(
         n,
-        params[cycle.MIN_ANGLE],
-        max(params[cycle.REACH], 2.0 * delta),
-        params[cycle.KAPPA_PAIR],
+        params[P.min_angle],
+        max(params[P.reach], 2.0 * delta),
+        params[P.kappa_pair],
         start,
         alpha,
         pairs,
@@ -155,21 +154,21 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         leaning = cycle.leaning_now(fx, fy, fz, W, delta, yielded, asked)
     outcome = cycle.iterate(
         n,
-        int(params[cycle.LIMITS]),
+        int(params[P.limits]),
         m,
         fx,
         fy,
         fz,
         mu,
         rho,
-        params[cycle.KAPPA],
-        0.5 * params[cycle.KAPPA_RATE] * max(rho, 1.0) * delta * delta,
-        params[cycle.KAPPA_PAIR],
-        params[cycle.PRICE] * heavy,
+        params[P.kappa],
+        0.5 * params[P.kappa_rate] * max(rho, 1.0) * delta * delta,
+        params[P.kappa_pair],
+        params[P.price] * heavy,
         yielded[0] != 0.0,
         leaning,
-        params[cycle.TOLERANCE],
-        int(params[cycle.ITERATIONS]),
+        params[P.tolerance],
+        int(params[P.iterations]),
         pairs,
         first,
         kappa_pair,
@@ -191,13 +190,13 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         M,
         info,
     )
-    info[INFO_ACTIVE] = cycle.active_limits(n, int(params[cycle.LIMITS]), m, z)
+    info[INFO_ACTIVE] = cycle.active_limits(n, int(params[P.limits]), m, z)
     squares = M[0] * M[0] + M[3] * M[3] + M[5] * M[5]
     squares += 2.0 * (M[1] * M[1] + M[2] * M[2] + M[4] * M[4])
     J = 0.5 * mu * (squares - n)
     rx, ry, rz = force[0], force[1], force[2]
     for i in range(n):
-        at = order[i]
+        at = int(order[i])
         J += 0.5 * data[newton.DATA * i + newton.OMEGA] * T[i] * T[i]
         tensions[at] = T[i] * sigma
         for k in range(3):
@@ -209,7 +208,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     info[INFO_BALANCE] = balance
     info[INFO_OBJECTIVE] = J * sigma * sigma
     info[INFO_GAP] = math.nan
-    if W > 1e-6 and mu > 0.0 and params[cycle.EQUAL] != 0.0:
+    if W > 1e-6 and mu > 0.0 and params[P.equal] != 0.0:
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
     reduced = balance > 1e-8 * max(1.0, sigma)
     yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
@@ -366,36 +365,36 @@ class Safe(AllocatorPart):
     def params(self, team: Team) -> Vector:
         n = team.n
         limited = self.max_thrust is not None or self.max_tilt_deg is not None
-        head = np.zeros(cycle.HEAD)
-        head[cycle.MU] = self.mu
-        head[cycle.MU_SCALED] = self.mu_scaling == "weight"
-        head[cycle.MU_FORCE] = self.mu_force
-        head[cycle.SIGMA] = max(team.load_mass * max(team.gravity, 1e-3) / n, 1e-6)
-        head[cycle.KAPPA] = self.barrier
-        head[cycle.KAPPA_RATE] = RATE_BARRIER
-        head[cycle.KAPPA_PAIR] = self.spread
-        head[cycle.MIN_ANGLE] = math.radians(self.min_angle_deg)
-        head[cycle.REACH] = self._reach(n)
-        head[cycle.MAX_RATE] = self.max_rate
-        head[cycle.SETTLING] = self.settling
-        head[cycle.TURNING] = self.turning
         weights = self._relative_weights(n)
-        head[cycle.PRICE] = GIVE_WAY * float(weights.max())
-        head[cycle.TOLERANCE] = self.tolerance
-        head[cycle.ITERATIONS] = self.max_iterations
-        head[cycle.LIMITS] = newton.LIMITS if limited else newton.TILT - 1
-        head[cycle.GRAVITY] = team.gravity
-        head[cycle.CONE] = math.radians(self.max_cone_deg)
-        head[cycle.TILT] = math.radians(self.max_tilt_deg or 89.0)
-        head[cycle.TOTAL] = float(np.sum(self.tension_caps(n)))
-        head[cycle.EQUAL] = bool(np.all(weights == 1.0))
-        cables = np.empty((n, cycle.PER_CABLE))
-        cables[:, 0] = weights
-        cables[:, 1] = self.tension_floors(n)
-        cables[:, 2] = self.tension_caps(n)
-        cables[:, 3] = team.masses
-        cables[:, 4] = 1e6 if self.max_thrust is None else self.max_thrust
-        return np.concatenate([head, cables.ravel()])
+        return cycle.PARAMS.pack(
+            n,
+            mu=self.mu,
+            mu_scaled=self.mu_scaling == "weight",
+            mu_force=self.mu_force,
+            sigma=max(team.load_mass * max(team.gravity, 1e-3) / n, 1e-6),
+            kappa=self.barrier,
+            kappa_rate=RATE_BARRIER,
+            kappa_pair=self.spread,
+            min_angle=math.radians(self.min_angle_deg),
+            reach=self._reach(n),
+            max_rate=self.max_rate,
+            settling=self.settling,
+            turning=self.turning,
+            price=GIVE_WAY * float(weights.max()),
+            tolerance=self.tolerance,
+            iterations=self.max_iterations,
+            limits=newton.LIMITS if limited else newton.TILT - 1,
+            g=team.gravity,
+            cone=math.radians(self.max_cone_deg),
+            tilt=math.radians(self.max_tilt_deg or 89.0),
+            total=float(np.sum(self.tension_caps(n))),
+            equal=bool(np.all(weights == 1.0)),
+            weight=weights,
+            T_min=self.tension_floors(n),
+            T_max=self.tension_caps(n),
+            m=team.masses,
+            f_max=1e6 if self.max_thrust is None else self.max_thrust,
+        )
 
     def _relative_weights(self, n: int) -> Vector:
         """Weight of each cable (n,) relative to their mean; ones, exactly, where all are the same."""
@@ -413,8 +412,7 @@ class Safe(AllocatorPart):
         n = team.n
         pairs = n * (n - 1) // 2
         limits = newton.LIMITS * n + pairs
-        cables = newton.DATA + 16 + newton.ROW + 2 * newton.RHS + 2  # 2: order, first
-        return np.zeros(cables * n + 3 * limits + 4 * pairs + 4 * n * n + newton.SYSTEM + 16)
+        return np.zeros(MEMORY.size(n) + LIMIT.size(limits) + PAIR.size(pairs) + 4 * n * n)
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         mu = self.mu

@@ -8,6 +8,7 @@ import numpy as np
 
 from colift.control.allocation.common.oracle import (
     Oracle,
+    P,
     TensionProblem,
     beyond_saddles,
     outcome_of,
@@ -38,7 +39,7 @@ def minimise(asked: TensionProblem, z: Vector, tolerance: float, iterations: int
 
 def _solve(problem: Problem) -> Outcome:
     asked = tension_problem(problem)
-    tolerance, iterations = float(problem.params[1]), int(problem.params[2])
+    tolerance, iterations = float(problem.params[P.tolerance]), int(problem.params[P.iterations])
     z = np.concatenate([problem.shares, problem.directions.ravel()])
 
     def solve(z: Vector) -> tuple[Vector, int]:

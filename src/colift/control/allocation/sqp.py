@@ -22,6 +22,8 @@ from colift.control.allocation.base import (
 from colift.control.allocation.common.oracle import paper_objective
 from colift.control.allocation.paper import newton
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 
@@ -31,7 +33,11 @@ _ZERO_FORCE = int(Status.ZERO_FORCE)
 _INVALID_FORCE = int(Status.INVALID_FORCE)
 _NUMERICAL_FAILURE = int(Status.NUMERICAL_FAILURE)
 
-_HEAD = 8  # memory: |F| of the last answer, its unit force (3), multiplier lam (3), spare
+PARAMS = Layout(team={"mu": 1, "tolerance": 1, "iterations": 1, "transport": 1})
+MEMORY = Layout(team={"size": 1, "force": 3, "lam": 3}, drone={"T": 1, "alpha": 3})
+"""Size and unit vector of the last force, the multiplier, and in columns the last answer; the solver's workspace follows.
+A team that changes starts anew."""
+P, M, SPANS = PARAMS.at, MEMORY.at, MEMORY.spans
 
 
 @kernel(SIGNATURE)
@@ -40,12 +46,12 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     tensions, directions = writes.desired_tensions, writes.desired_directions
     info = writes.allocator_info
     n = tensions.shape[0]
-    mu = params[0]
-    transport = params[3] != 0.0
-    last_T = memory[_HEAD : _HEAD + n]
-    last_alpha = memory[_HEAD + n : _HEAD + 4 * n]
-    work = memory[_HEAD + 4 * n :]
-    lam = memory[4:7]
+    mu = params[P.mu]
+    transport = params[P.transport] != 0.0
+    last_T = column(memory, M.rows, n, SPANS.T)
+    last_alpha = column(memory, M.rows, n, SPANS.alpha)
+    work = memory[M.rows + M.width * n :]
+    lam = column(memory, 0, 1, SPANS.lam)
     T = tensions
     alpha = directions.reshape(3 * n)
     for k in range(info.shape[0]):
@@ -62,7 +68,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     if 1e-9 * math.sqrt(mu) >= W or W <= 1e-12:
         for i in range(n):
             T[i] = 0.0
-        memory[0] = 0.0
+        memory[M.size] = 0.0
         info[INFO_BALANCE] = W
         info[INFO_RESIDUAL] = math.nan
         info[INFO_OBJECTIVE] = math.nan
@@ -72,7 +78,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     fy /= W
     fz /= W
 
-    W_last = memory[0]
+    W_last = memory[M.size]
     total = 0.0
     for i in range(n):
         last_T[i] = T[i]
@@ -84,7 +90,9 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         for i in range(n):
             T[i] /= W_last
         if transport:
-            newton.rotate(n, memory[1], memory[2], memory[3], fx, fy, fz, alpha, lam)
+            newton.rotate(
+                n, memory[M.force], memory[M.force + 1], memory[M.force + 2], fx, fy, fz, alpha, lam
+            )
     else:
         # The optimum's multiplier has the opposite sign: starting here makes the first step bolder,
         # and far fewer cold starts end on a saddle with a slack cable.
@@ -93,13 +101,14 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         lam[2] = -fz / n
         for i in range(n):
             T[i] = T[i] / total if total > 0.0 else 1.0 / n
-    memory[1] = fx
-    memory[2] = fy
-    memory[3] = fz
+    memory[M.force] = fx
+    memory[M.force + 1] = fy
+    memory[M.force + 2] = fz
 
     outcome = newton.solve(
-        n, fx, fy, fz, mu / (W * W), params[1], int(params[2]), T, alpha, lam, work, info
-    )
+        n, fx, fy, fz, mu / (W * W), params[P.tolerance], int(params[P.iterations]), T, alpha, lam,
+        work, info,
+    )  # fmt: skip
     if outcome == newton.NOT_FINITE:
         # Last directions, tensions corrected in force coordinates so that the force is balanced.
         for i in range(n):
@@ -109,7 +118,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         newton.project(n, fx, fy, fz, T, alpha)
         for k in range(3):
             lam[k] = -force[k] / (W * n)
-    memory[0] = W
+    memory[M.size] = W
     bx = by = bz = 0.0
     for i in range(n):
         T[i] *= W
@@ -145,10 +154,13 @@ class Sqp(AllocatorPart):
     """Turn the warm start with the force; false starts from the last answer as it was."""
 
     def params(self, team: Team) -> Vector:
-        return np.array([self.mu, self.tolerance, self.max_iterations, self.transport], dtype=float)
+        return PARAMS.pack(
+            team.n, mu=self.mu, tolerance=self.tolerance, iterations=self.max_iterations,
+            transport=self.transport,
+        )  # fmt: skip
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(_HEAD + 4 * team.n + newton.workspace_size(team.n))
+        return np.zeros(MEMORY.size(team.n) + newton.workspace_size(team.n))
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         return paper_objective(self.mu, tensions, directions)

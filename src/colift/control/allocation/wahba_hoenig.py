@@ -12,11 +12,17 @@ from pydantic import Field
 from colift.control.allocation.base import AllocatorPart, Status
 from colift.control.allocation.common.plain import Outcome, Problem, plain_kernel
 from colift.errors import MissingExtraError
+from colift.kernel.layout import Layout
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array, ring, rotation_between
 
-_HEAD = 4  # params: weight of the force in the planes, settling, formation weight, tan of its cone
+PARAMS = Layout(
+    team={"plane_weight": 1, "settling": 1, "formation_weight": 1, "slope": 1},
+    drone={"length": 1, "tilt": 1, "spread": 3},
+)
+"""``slope``: tangent of the formation's cone, in which a cable stands at ``spread``."""
+P = PARAMS.at
 _EQUALITY, _ACTIVE = 5, 1  # DAQP's marks of a constraint
 _RESTART_CONE = math.radians(45.0)
 _PAIRS = 64
@@ -102,9 +108,10 @@ def least_forces(
 
 def _solve(problem: Problem) -> Outcome:
     n, force, params = len(problem.shares), problem.force, problem.params
-    weight, settling, formation, slope = params[:_HEAD]
-    lengths, tilts = params[_HEAD : _HEAD + n], params[_HEAD + n : _HEAD + 2 * n]
-    spread = params[_HEAD + 2 * n :].reshape(n, 3)
+    weight, settling = params[P.plane_weight], params[P.settling]
+    formation, slope = params[P.formation_weight], params[P.slope]
+    lengths, tilts = PARAMS.view(params, "length")[:, 0], PARAMS.view(params, "tilt")[:, 0]
+    spread = PARAMS.view(params, "spread")
     last = -problem.shares[:, None] * problem.directions
     inertia = settling / max(problem.dt, 1e-6)
     total = 1.0 + inertia + formation
@@ -182,14 +189,11 @@ class WahbaHoenig(AllocatorPart):
             raise MissingExtraError(message)
         slope = math.tan(math.radians(self.formation_cone_deg))
         outward = -ring(team.n, math.radians(45.0)) * math.sqrt(2.0) - [0.0, 0.0, 1.0]
-        return np.concatenate(
-            [
-                [self.plane_weight, self.settling, self.formation_weight, slope],
-                team.cable_lengths,
-                self.tilts(team),
-                outward.ravel() * (team.n > 1),
-            ]
-        )
+        return PARAMS.pack(
+            team.n, plane_weight=self.plane_weight, settling=self.settling,
+            formation_weight=self.formation_weight, slope=slope, length=team.cable_lengths,
+            tilt=self.tilts(team), spread=outward * (team.n > 1),
+        )  # fmt: skip
 
     def memory(self, team: Team) -> Vector:
         return np.zeros(team.n * (team.n - 1))

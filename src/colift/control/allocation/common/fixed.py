@@ -10,6 +10,8 @@ from colift.control.allocation.base import SIGNATURE, AllocatorPart, Status
 from colift.control.allocation.common.share import balance, begin
 from colift.control.allocation.paper.newton import rotate
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array, min_norm_tensions
@@ -18,6 +20,11 @@ _CONVERGED = int(Status.CONVERGED)
 _ZERO_FORCE = int(Status.ZERO_FORCE)
 _INVALID_FORCE = int(Status.INVALID_FORCE)
 _CLAMPED = int(Status.CLAMPED)
+
+PARAMS = Layout(drone={"direction": 3, "share": 1})
+"""In columns; of an upward force."""
+MEMORY = Layout(team={"spare": 3})
+P, SPANS = PARAMS.at, PARAMS.spans
 
 
 @kernel(SIGNATURE)
@@ -33,11 +40,13 @@ def allocate_fixed(now, sees, params, memory, writes):  # type: ignore[no-untype
     if W == 0.0:
         return _ZERO_FORCE
     alpha = directions.reshape(3 * n)
+    pattern = column(params, P.rows, n, SPANS.direction)
+    shares = column(params, P.rows, n, SPANS.share)
     for k in range(3 * n):
-        alpha[k] = params[k]
+        alpha[k] = pattern[k]
     rotate(n, 0.0, 0.0, 1.0, force[0] / W, force[1] / W, force[2] / W, alpha, memory)
     for i in range(n):
-        tensions[i] = W * params[3 * n + i]
+        tensions[i] = W * shares[i]
     return _CONVERGED if balance(force, tensions, directions, info) <= 1e-9 * W else _CLAMPED
 
 
@@ -45,6 +54,7 @@ class FixedPattern(AllocatorPart):
     """Base of the baselines: one pattern, whatever happens."""
 
     kernel = allocate_fixed
+    remembers = MEMORY
 
     def pattern(self, n: int) -> Array:
         """Directions (n, 3) for an upward force."""
@@ -54,6 +64,3 @@ class FixedPattern(AllocatorPart):
         directions = self.pattern(team.n)
         shares = np.maximum(min_norm_tensions(directions, [0.0, 0.0, 1.0]), 0.0)
         return np.concatenate([directions.ravel(), shares])
-
-    def memory(self, team: Team) -> Vector:
-        return np.zeros(3)

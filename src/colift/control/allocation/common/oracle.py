@@ -18,6 +18,7 @@ from colift.control.allocation.base import AllocatorPart, Status
 from colift.control.allocation.common.plain import Outcome, Problem, balanced
 from colift.control.allocation.paper import newton
 from colift.errors import MissingExtraError
+from colift.kernel.layout import Layout
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
@@ -195,6 +196,12 @@ class TensionProblem:
 
 _NO_LIMIT = 1e300  # N
 
+PARAMS = Layout(
+    team={"mu": 1, "tolerance": 1, "iterations": 1, "least": 1, "most": 1, "cosine": 1, "height": 1}
+)
+"""Tensions ``least`` and ``most``; ``cosine`` and ``height`` as in :class:`Limits`."""
+P = PARAMS.at
+
 Degrees = Annotated[float, Field(gt=0.0, lt=150.0)]
 
 
@@ -219,16 +226,16 @@ class Oracle(AllocatorPart):
     def params(self, team: Team) -> Vector:
         if message := self.missing():
             raise MissingExtraError(message)
-        return np.array(
-            [
-                self.mu,
-                self.tolerance,
-                self.max_iterations,
-                self.tension_min,
-                _NO_LIMIT if self.tension_max is None else self.tension_max,
-                1.0 if self.min_angle_deg is None else math.cos(math.radians(self.min_angle_deg)),
-                1.0 if self.max_cone_deg is None else -math.cos(math.radians(self.max_cone_deg)),
-            ]
+        most, angle, cone = self.tension_max, self.min_angle_deg, self.max_cone_deg
+        return PARAMS.pack(
+            team.n,
+            mu=self.mu,
+            tolerance=self.tolerance,
+            iterations=self.max_iterations,
+            least=self.tension_min,
+            most=_NO_LIMIT if most is None else most,
+            cosine=1.0 if angle is None else math.cos(math.radians(angle)),
+            height=1.0 if cone is None else -math.cos(math.radians(cone)),
         )
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
@@ -237,11 +244,10 @@ class Oracle(AllocatorPart):
 
 def tension_problem(problem: Problem) -> TensionProblem:
     """What the kernel's parameters ask for, in units of the force."""
-    mu, _, _, low, high, cosine, height = problem.params
-    scale = problem.size
-    most = math.inf if high >= _NO_LIMIT else high / scale
-    limits = Limits(low / scale, most, cosine, height)
-    return TensionProblem(len(problem.shares), mu / scale**2, problem.force, limits)
+    params, scale = problem.params, problem.size
+    most = math.inf if params[P.most] >= _NO_LIMIT else params[P.most] / scale
+    limits = Limits(params[P.least] / scale, most, params[P.cosine], params[P.height])
+    return TensionProblem(len(problem.shares), params[P.mu] / scale**2, problem.force, limits)
 
 
 def beyond_saddles(

@@ -7,7 +7,7 @@ Pairs. A direction turns by at most ``delta`` per cycle, so only pairs closer th
 can come too close in this cycle. Those within ``min_angle + reach`` are listed, and the weight of their
 barrier fades to zero at that distance, so that nothing jumps when a pair enters or leaves.
 
-This file imports only the compiler front end.
+This file imports only the compiler front end and the names of places.
 """
 
 from __future__ import annotations
@@ -17,40 +17,25 @@ import math
 from colift.control.allocation.limits import newton, recovery
 from colift.control.allocation.paper.newton import rotate
 from colift.kernel.jit import inline
+from colift.kernel.layout import Layout
 
-(
-    MU,
-    MU_SCALED,
-    MU_FORCE,
-    SIGMA,
-    KAPPA,
-    KAPPA_RATE,
-    KAPPA_PAIR,
-    MIN_ANGLE,
-    REACH,
-    MAX_RATE,
-    SETTLING,
-    TURNING,
-    PRICE,
-    TOLERANCE,
-    ITERATIONS,
-    LIMITS,
-    GRAVITY,
-    CONE,
-    TILT,
-    TOTAL,
-    EQUAL,
-) = range(21)
-"""Places in the parameter vector; HEAD of them, then PER_CABLE values for each cable."""
-HEAD = 24
-PER_CABLE = 5
-"""Weight, least and largest tension (N), mass (kg), largest thrust (N)."""
+PARAMS = Layout(
+    team={
+        "mu": 1, "mu_scaled": 1, "mu_force": 1, "sigma": 1, "kappa": 1, "kappa_rate": 1,
+        "kappa_pair": 1, "min_angle": 1, "reach": 1, "max_rate": 1, "settling": 1, "turning": 1,
+        "price": 1, "tolerance": 1, "iterations": 1, "limits": 1, "g": 1, "cone": 1, "tilt": 1,
+        "total": 1, "equal": 1,
+    },
+    drone={"weight": 1, "T_min": 1, "T_max": 1, "m": 1, "f_max": 1},
+)  # fmt: skip
+"""Tensions and the largest thrust in N."""
+P = PARAMS.at
 
 MAX_TURN = 0.5
 """Largest turn of a direction in one cycle, rad, however long the cycle."""
 
 A, OMEGA, T_MIN, T_MAX = newton.A, newton.OMEGA, newton.T_MIN, newton.T_MAX
-COS_CONE, VERS_RATE, P = newton.COS_CONE, newton.VERS_RATE, newton.P
+COS_CONE, VERS_RATE, OWN = newton.COS_CONE, newton.VERS_RATE, newton.P
 F_MAX, COS_TILT = newton.F_MAX, newton.COS_TILT
 
 CONVERGED, ITERATION_LIMIT, FORCE_REDUCED = 0, 1, 2
@@ -94,9 +79,9 @@ RETRIES = 8
 def sort_cables(n, directions, order):  # type: ignore[no-untyped-def]
     """Order the cables along the x axis, from the last cycle's order: neighbours get close numbers.
 
-    Small teams keep their own order: their matrix is dense anyhow.
+    Small teams keep their own order: their matrix is dense anyhow. Numbers of cables are kept as floats, which are exact.
     """
-    total = 0
+    total = 0.0
     for i in range(n):
         total += order[i]
     if total != n * (n - 1) // 2 or n <= 8:
@@ -105,10 +90,10 @@ def sort_cables(n, directions, order):  # type: ignore[no-untyped-def]
     if n <= 8:
         return
     for i in range(1, n):
-        moving = order[i]
+        moving = int(order[i])
         key = directions[moving, 0]
         j = i - 1
-        while j >= 0 and directions[order[j], 0] > key:
+        while j >= 0 and directions[int(order[j]), 0] > key:
             order[j + 1] = order[j]
             j -= 1
         order[j + 1] = moving
@@ -152,9 +137,10 @@ def set_up(  # type: ignore[no-untyped-def]
 ):
     """Limits of every cable in this cycle and a strictly feasible ``w``; whether one was relaxed."""
     vers = 2.0 * math.sin(0.5 * delta) ** 2
-    cos_cone = math.cos(params[CONE])
+    cos_cone = math.cos(params[P.cone])
     for i in range(n):
-        x, y, z = directions[order[i], 0], directions[order[i], 1], directions[order[i], 2]
+        at = int(order[i])
+        x, y, z = directions[at, 0], directions[at, 1], directions[at, 2]
         norm = math.sqrt(x * x + y * y + z * z)
         if not (norm > 1e-9 and norm < 1e9):
             x, y, z, norm = 0.0, 0.0, -1.0, 1.0
@@ -165,18 +151,18 @@ def set_up(  # type: ignore[no-untyped-def]
     for k in range(3 * n):
         alpha[k] = start[k]
     relaxed = False
-    if recovery.is_broken(n, math.cos(params[MIN_ANGLE]), cos_cone, recovery.SURE, start):
+    if recovery.is_broken(n, math.cos(params[P.min_angle]), cos_cone, recovery.SURE, start):
         relaxed = True
-        recovery.lead_back(n, params[MIN_ANGLE], params[CONE], delta, start, alpha)
+        recovery.lead_back(n, params[P.min_angle], params[P.cone], delta, start, alpha)
     for i in range(n):
         d = newton.DATA * i
-        p = HEAD + PER_CABLE * order[i]
+        p = P.rows + P.width * int(order[i])
         for k in range(3):
             data[d + k] = start[3 * i + k]
             data[d + newton.HOME + k] = alpha[3 * i + k]
-        low = params[p + 1] * unit
-        high = params[p + 2] * unit
-        data[d + OMEGA] = params[p]
+        low = params[p + P.T_min] * unit
+        high = params[p + P.T_max] * unit
+        data[d + OMEGA] = params[p + P.weight]
         data[d + T_MIN] = low
         data[d + T_MAX] = high
         data[d + VERS_RATE] = vers
@@ -185,24 +171,24 @@ def set_up(  # type: ignore[no-untyped-def]
         if -alpha[3 * i + 2] - cos_cone <= recovery.SURE:
             middle = -0.5 * (alpha[3 * i + 2] + start[3 * i + 2])
             data[d + COS_CONE] = min(cos_cone, min(middle, -alpha[3 * i + 2] - recovery.ROOM))
-        t = tensions[order[i]] * unit
+        t = tensions[int(order[i])] * unit
         if not (t > 0.0 and t < 1e300):
             t = W / n
         room = 1e-3 * (high - low)
         low += room
         t = max(min(t, high - room), low)
-        if params[LIMITS] > 4.0:
-            cos_tilt = math.cos(params[TILT])
+        if params[P.limits] > 4.0:
+            cos_tilt = math.cos(params[P.tilt])
             drone_limits(
                 d,
-                params[p + 3] * unit,
-                params[p + 4] * unit,
-                params[GRAVITY],
-                params[TILT],
+                params[p + P.m] * unit,
+                params[p + P.f_max] * unit,
+                params[P.g],
+                params[P.tilt],
                 acceleration,
                 data,
             )
-            px, py, pz = data[d + P], data[d + P + 1], data[d + P + 2]
+            px, py, pz = data[d + OWN], data[d + OWN + 1], data[d + OWN + 2]
             for k in range(8):
                 x = px - t * alpha[3 * i]
                 y = py - t * alpha[3 * i + 1]
@@ -226,18 +212,18 @@ def set_up(  # type: ignore[no-untyped-def]
 @inline
 def breaks_a_limit(n, order, unit, params, data, T, alpha):  # type: ignore[no-untyped-def]
     """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
-    cos_angle, cos_cone = math.cos(params[MIN_ANGLE]), math.cos(params[CONE])
+    cos_angle, cos_cone = math.cos(params[P.min_angle]), math.cos(params[P.cone])
     if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, alpha):
         return True
-    if params[LIMITS] > 4.0:
-        cos_tilt = math.cos(params[TILT])
+    if params[P.limits] > 4.0:
+        cos_tilt = math.cos(params[P.tilt])
         for i in range(n):
             d = newton.DATA * i
-            x = data[d + P] - T[i] * alpha[3 * i]
-            y = data[d + P + 1] - T[i] * alpha[3 * i + 1]
-            z = data[d + P + 2] - T[i] * alpha[3 * i + 2]
+            x = data[d + OWN] - T[i] * alpha[3 * i]
+            y = data[d + OWN + 1] - T[i] * alpha[3 * i + 1]
+            z = data[d + OWN + 2] - T[i] * alpha[3 * i + 2]
             thrust = math.sqrt(x * x + y * y + z * z)
-            most = params[HEAD + PER_CABLE * order[i] + 4] * unit
+            most = params[P.rows + P.width * int(order[i]) + P.f_max] * unit
             if thrust > most * (1.0 + recovery.ROUNDING):
                 return True
             if z < (cos_tilt - recovery.ROUNDING) * thrust:
@@ -264,9 +250,9 @@ def drone_limits(d, mass, thrust, gravity, tilt, acceleration, data):  # type: i
         y *= most / level
     size = math.sqrt(x * x + y * y + z * z)
     scale = 0.9 * thrust / size if size > 0.9 * thrust else 1.0
-    data[d + P] = x * scale
-    data[d + P + 1] = y * scale
-    data[d + P + 2] = z * scale
+    data[d + OWN] = x * scale
+    data[d + OWN + 1] = y * scale
+    data[d + OWN + 2] = z * scale
     data[d + F_MAX] = thrust
     data[d + COS_TILT] = math.cos(tilt)
 

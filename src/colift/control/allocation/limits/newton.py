@@ -106,8 +106,8 @@ def margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g):  # type: ignore
             g[o + 5] = fz - data[d + COS_TILT] * thrust
     o = LIMITS * n
     for k in range(m):
-        i = 3 * pairs[2 * k]
-        j = 3 * pairs[2 * k + 1]
+        i = 3 * int(pairs[2 * k])
+        j = 3 * int(pairs[2 * k + 1])
         g[o + k] = cos_max[k] - (
             alpha[i] * alpha[j] + alpha[i + 1] * alpha[j + 1] + alpha[i + 2] * alpha[j + 2]
         )
@@ -161,7 +161,7 @@ def assemble(  # type: ignore[no-untyped-def]
         rows[o + 5] = -y
         for k in range(6, ROW):
             rows[o + k] = 0.0
-        for k in range(2 * first[i], 2 * i):
+        for k in range(2 * int(first[i]), 2 * i):
             K[size * 2 * i + k] = 0.0
             K[size * (2 * i + 1) + k] = 0.0
     M[0] = xx
@@ -172,8 +172,8 @@ def assemble(  # type: ignore[no-untyped-def]
     M[5] = zz
 
     for k in range(m):
-        i = pairs[2 * k]
-        j = pairs[2 * k + 1]  # j < i
+        i = int(pairs[2 * k])
+        j = int(pairs[2 * k + 1])  # j < i
         oi = ROW * i
         oj = ROW * j
         gk = g[LIMITS * n + k]
@@ -395,12 +395,12 @@ def factor(n, shift, mu, T, alpha, rows, K, first, Y):  # type: ignore[no-untype
         Y[k1 + 8] = rows[o + 14] - h2 * rt
         top = size * 2 * i
         low = top + size
-        for j in range(first[i], i):
+        for j in range(int(first[i]), i):
             tj = size * 2 * j
             lj = tj + size
             s00, s01 = K[top + 2 * j], K[top + 2 * j + 1]
             s10, s11 = K[low + 2 * j], K[low + 2 * j + 1]
-            for k in range(2 * max(first[i], first[j]), 2 * j):
+            for k in range(2 * int(max(first[i], first[j])), 2 * j):
                 x0, x1 = K[top + k], K[low + k]
                 y0, y1 = K[tj + k], K[lj + k]
                 s00 -= x0 * y0
@@ -560,7 +560,7 @@ def back_substitute(n, alpha, rows, K, first, Y, S, dw):  # type: ignore[no-unty
         k1 = k0 + RHS
         eta2 = Y[k1] * K[low + 2 * i + 1]
         eta1 = (Y[k0] - K[low + 2 * i] * eta2) * K[top + 2 * i]
-        for j in range(first[i], i):
+        for j in range(int(first[i]), i):
             Y[RHS * 2 * j + 8] -= K[top + 2 * j] * eta1 + K[low + 2 * j] * eta2
             Y[RHS * (2 * j + 1) + 8] -= K[top + 2 * j + 1] * eta1 + K[low + 2 * j + 1] * eta2
         o = ROW * i
