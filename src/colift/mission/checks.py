@@ -87,10 +87,17 @@ def cross_checks(
     if len(lists["disturbance"]) > MAX_DISTURBANCES:
         message = f"must be at most {MAX_DISTURBANCES}"
         yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)
-    for i, fault in enumerate(lists["fault"]):
+    yield from _fault_checks(frame, parts, lists["fault"], broken)
+
+
+def _fault_checks(
+    frame: Frame, parts: Mapping[str, Part], faults: list[Part], broken: set[str]
+) -> Iterable[Problem]:
+    """Faults of drones that are not there, after the end, or of motors that the rotors do not have."""
+    n, timing, rotors = frame.drones.count, frame.timing, parts.get("actuation")
+    for i, fault in enumerate(faults):
         assert isinstance(fault, FaultPart)
         at, drone = fault.at, fault.drone
-        rotors = parts.get("actuation")
         if fault.needs_motors and rotors is not None and not type(rotors).has_motors:  # type: ignore[attr-defined]
             message = (
                 f'needs motors, but actuation.kind = "{kind_of(type(rotors))}" has none: a weak motor would not '
