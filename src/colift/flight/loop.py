@@ -90,7 +90,7 @@ _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
 _disturb = PORTS["disturbance"].invoke
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycles):  # type: ignore[no-untyped-def]
     """Run physics steps ``first <= k < last``; return the step reached.
 
@@ -149,7 +149,9 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
         _step(wires.plant, k, t, dt)
 
         if k % every.recording == 0:
-            log[k // every.recording - first_row, :] = bus.row
+            row = k // every.recording - first_row
+            for m in range(bus.row.shape[0]):
+                log[row, m] = bus.row[m]
             bus.peak_tensions[:] = 0.0
             bus.catch_impulses[:] = 0.0
         for i in range(n):

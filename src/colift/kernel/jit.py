@@ -48,11 +48,17 @@ mask = types.boolean[::1]
 _FASTMATH = {"contract"}
 
 
-def kernel(signature: Any) -> Callable[[F], F]:
-    """Compile a kernel for one explicit signature, cached on disk; called from Python, it lets other threads run."""
+def kernel(signature: Any, *, counted: bool = True) -> Callable[[F], F]:
+    """Compile a kernel for one explicit signature, cached on disk; called from Python, it lets other threads run.
+
+    Not ``counted`` is one in which nobody counts who refers to an array: it makes and returns none, and calls others by
+    their address, to each of which a call would cost as much as a small kernel takes.
+    """
 
     def decorate(function: F) -> F:
-        compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=_FASTMATH)(function)
+        njit: Any = numba.njit
+        options = {"nogil": True, "error_model": "numpy", "fastmath": _FASTMATH, "_nrt": counted}
+        compiled = njit(**options)(function)
         if JIT_ENABLED:
             with _cache_for(function):
                 compiled._cache = _Cache(function)
