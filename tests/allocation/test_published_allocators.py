@@ -215,7 +215,8 @@ def test_every_answer_is_within_the_half_spaces_of_the_directions_before(n):
         pytest.skip(message)
     each = Allocator(found(), team)
     tilts, rng = each.part.tilts(team), np.random.default_rng(n)
-    before, checked = each._directions.copy(), 0
+    before, checked = ring(n, math.radians(35.0)), 0
+    each.reset(directions=before)
     for _ in range(40):
         force = HOVER + 0.1 * rng.normal(size=3)
         answer = each.allocate(force)
@@ -417,7 +418,8 @@ def test_general_solvers_agree_within_limits():
 @pytest.mark.parametrize("kind", ORACLES)
 def test_limits_that_cannot_hold_keep_the_directions_and_balance_the_force(kind):
     each = allocator(kind, 4, min_angle_deg=80.0, max_cone_deg=20.0)
-    start = each._directions.copy()
+    start = ring(4, math.radians(35.0))
+    each.reset(directions=start)
     answer = each.allocate(HOVER)
     assert answer.status is Status.NUMERICAL_FAILURE
     assert answer.force_residual < 1e-12
