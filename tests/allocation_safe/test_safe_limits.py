@@ -257,6 +257,7 @@ def test_a_team_that_loses_a_drone_keeps_the_other_cables_limits():
     assert left.tension_min == part.tension_min
 
 
+@pytest.mark.slow
 def test_128_cables_work():
     allocator = SafeAllocator(Team.uniform(128, load_mass=7.0), min_angle_deg=8.0)
     for k in range(30):
