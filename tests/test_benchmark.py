@@ -12,6 +12,7 @@ import pytest
 
 from colift.control.allocation.base import Allocator
 from colift.errors import ColiftError
+from colift.part import find
 from colift.study import bench as benchmark
 from colift.study.bench import instructions, problems, solvers, tables, timing
 from colift.study.bench.problems import Problem
@@ -80,7 +81,7 @@ def test_a_cable_that_pushes_is_flagged(n) -> None:
 @pytest.mark.parametrize("n", SIZES)
 def test_a_balanced_answer_that_is_not_optimal_is_flagged(n) -> None:
     problem, force, _, _ = answered("paper", n)
-    fixed = Allocator(solvers._plain("ring")(problem), problem.team).allocate(force)
+    fixed = Allocator(find("allocation", "ring")(), problem.team).allocate(force)
     found = judge(problem, force, fixed.tensions, fixed.directions)
     assert found.balance < TOLERANCES["balance"]
     assert {"not stationary", "not optimal"} <= set(found.faults(problem))
@@ -256,6 +257,7 @@ def test_instructions_need_valgrind_and_its_kind_of_processor(monkeypatch) -> No
     assert "arm64" in instructions.count([2])["reason"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(instructions.reason_against()), reason="needs valgrind")
 def test_instructions_are_those_of_the_calls() -> None:
     counted = instructions.count([2, 4])

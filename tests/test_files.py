@@ -94,6 +94,7 @@ def test_standard_output_without_room(tmp_path: Path) -> None:
     assert "No space left on device" in one_line(done)
 
 
+@pytest.mark.slow
 def test_a_folder_with_something_else_is_not_written_into(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("chapter one")
     few = ("--seeds", "1", "--set", "timing.duration=0.1")
@@ -107,6 +108,7 @@ def test_a_folder_with_something_else_is_not_written_into(tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+@pytest.mark.slow
 def test_what_an_earlier_run_left_is_replaced_as_a_whole(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert colift("run", "hover", *SHORT, "--out", str(out)).returncode == 0

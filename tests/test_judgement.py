@@ -161,6 +161,7 @@ def test_the_page_holds_every_flight_once(flight: Recording, tmp_path: Path) -> 
     assert "<script" not in page
 
 
+@pytest.mark.slow
 def test_the_command_prints_one_object(flight: Recording, tmp_path: Path) -> None:
     file = flight.save(tmp_path / "flight.h5")
     command = [sys.executable, "-m", "colift", "judge", str(file), "--allocators", "safe,ring"]

@@ -16,6 +16,8 @@ from colift.show.report.reproduction import write_page
 from colift.study import reproduction
 from colift.team.geometry import pairwise_angles
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def result() -> reproduction.Reproduction:

@@ -91,6 +91,7 @@ def test_the_verdict_names_every_fault() -> None:
     assert safety._verdict(good, far) == "holds; the paper's allocator does not survive"
 
 
+@pytest.mark.slow
 def test_commands_print_one_object_and_tell_by_exit_code() -> None:
     def colift(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

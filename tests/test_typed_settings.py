@@ -47,6 +47,7 @@ def test_defaults_are_those_of_the_part(allocator, part):
         assert given[name].default == part.model_fields[name].default, name
 
 
+@pytest.mark.slow
 def test_mypy_finds_what_is_misspelt_and_nothing_else(tmp_path):
     pytest.importorskip("mypy")
     program = tmp_path / "program.py"

@@ -107,17 +107,13 @@ def test_min_norm_keeps_its_formation_and_tells_that_two_cables_cannot_pull_acro
 
 def test_min_norm_of_the_formation_that_is_left_when_a_drone_leaves():
     settings, rng = MinNorm(), np.random.default_rng(0)
-    old = Allocator(settings, 5)
+    each = Allocator(settings, 5)
     directions = ring(5, 0.6) + 0.1 * rng.normal(size=(5, 3))
-    old.reset(directions=directions)
-    old.allocate(HOVER)
-    left = settings.carry_over(
-        old._memory, settings.memory(Team.uniform(4)), np.array([0, 1, 3, 4])
-    )
-    new = Allocator(settings, 4)
-    new._memory = left
+    each.reset(directions=directions)
+    each.allocate(HOVER)
+    each.lose(2)
     kept = np.delete(directions / np.linalg.norm(directions, axis=1, keepdims=True), 2, axis=0)
-    answer = new.allocate(HOVER)
+    answer = each.allocate(HOVER)
     expected = np.maximum(-np.linalg.pinv(kept.T) @ HOVER, 0.0)
     np.testing.assert_allclose(answer.tensions, expected, atol=1e-12)
     np.testing.assert_allclose(answer.directions, kept, atol=1e-15)
@@ -157,10 +153,8 @@ def test_without_internal_force_all_cables_are_parallel_and_the_norm_is_least():
 
 def test_the_spread_closes_the_gap_of_a_lost_drone_and_stays_balanced():
     settings = InternalForce(settling=0.05)
-    four, three = (settings.memory(Team.uniform(n)) for n in (4, 3))
-    memory = settings.carry_over(four, three, np.array([0, 2, 3]))
-    left = Allocator(settings, 3)
-    left._memory = memory
+    left = Allocator(settings, 4)
+    left.lose(1)
     first = left.allocate(HOVER)
     assert first.force_residual < 1e-15
     gaps = pairwise_angles(first.directions)
@@ -215,7 +209,8 @@ def test_every_answer_is_within_the_half_spaces_of_the_directions_before(n):
         pytest.skip(message)
     each = Allocator(found(), team)
     tilts, rng = each.part.tilts(team), np.random.default_rng(n)
-    before, checked = each._directions.copy(), 0
+    before, checked = ring(n, math.radians(35.0)), 0
+    each.reset(directions=before)
     for _ in range(40):
         force = HOVER + 0.1 * rng.normal(size=3)
         answer = each.allocate(force)
@@ -417,7 +412,8 @@ def test_general_solvers_agree_within_limits():
 @pytest.mark.parametrize("kind", ORACLES)
 def test_limits_that_cannot_hold_keep_the_directions_and_balance_the_force(kind):
     each = allocator(kind, 4, min_angle_deg=80.0, max_cone_deg=20.0)
-    start = each._directions.copy()
+    start = ring(4, math.radians(35.0))
+    each.reset(directions=start)
     answer = each.allocate(HOVER)
     assert answer.status is Status.NUMERICAL_FAILURE
     assert answer.force_residual < 1e-12

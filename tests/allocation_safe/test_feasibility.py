@@ -149,6 +149,7 @@ def test_three_drones_that_may_hardly_tilt_are_judged_by_narrow_formations():
     assert extreme(limits, formations(3, limits)).weight > 63.5  # wide ones alone: 26.4
 
 
+@pytest.mark.slow
 def test_ipopt_finds_no_heavier_load_for_random_teams(monkeypatch):
     """Of the teams of docs/figures/feasibility.py the first; there are all, and more starts."""
     pytest.importorskip("casadi", reason="optional: the extra ipopt (casadi)")

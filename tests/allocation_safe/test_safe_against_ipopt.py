@@ -16,6 +16,7 @@ from colift.team import Team
 from colift.team.geometry import pairwise_angles
 
 pytest.importorskip("casadi", reason="optional: the extra ipopt (casadi)")
+pytestmark = pytest.mark.slow
 
 PROBLEMS = 200
 LEAST_ANGLES = {3: 60.0, 4: 50.0, 5: 42.0, 6: 44.0}  # degrees, wider than the paper's optimum

@@ -10,7 +10,7 @@ import pytest
 from colift.control.allocation.limits.cycle import JUMP, TURN
 from colift.control.allocation.safe import RATE_BARRIER, SafeAllocator
 from colift.team import Team
-from colift.team.geometry import rotation_between
+from colift.team.geometry import ring, rotation_between
 
 
 def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
@@ -62,12 +62,15 @@ def turned(allocator, before, facing, force):
 def test_the_answer_is_stationary_in_every_direction_that_keeps_the_force(n):
     allocator = SafeAllocator(n, max_thrust=12.0, max_tilt_deg=60.0, tolerance=1e-10)
     rng, facing = np.random.default_rng(n), None
+    directions = ring(n, math.radians(60.0))
+    allocator.reset(directions=directions)
     for _ in range(20):
-        before = allocator._directions.copy()
+        before = directions
         acceleration = 0.2 * rng.standard_normal(3)
         force = 0.225 * (acceleration + [0.0, 0.0, 9.81])
         home, facing = turned(allocator, before, facing, force)
         answer = allocator.allocate(force, acceleration)
+        directions = answer.directions
         if not answer.status.ok:
             continue
         sigma = 0.225 * 9.81 / n
@@ -140,7 +143,8 @@ def test_it_agrees_with_slsqp_on_the_hard_problem():
 def test_the_order_of_the_cables_does_not_matter():
     rng = np.random.default_rng(1)
     first = SafeAllocator(Team.uniform(12, load_mass=0.7), min_angle_deg=20.0)
-    start = first._directions.copy()
+    start = ring(12, math.radians(60.0))
+    first.reset(directions=start)
     shuffle = rng.permutation(12)
     second = SafeAllocator(Team.uniform(12, load_mass=0.7), min_angle_deg=20.0)
     second.reset(directions=start[shuffle])

@@ -42,6 +42,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_flies_the_campaign_though_a_worker_is_killed(
     tmp_path: Path, allocator: Callable[[str], Path]
 ) -> None:

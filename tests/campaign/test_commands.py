@@ -43,6 +43,7 @@ class Images(HTMLParser):
         self.loads += not source.startswith("data:")
 
 
+@pytest.mark.slow
 def test_an_allocator_of_ones_own_takes_part_without_touching_the_package(tmp_path: Path) -> None:
     assert len(EXAMPLE.read_text().splitlines()) < 40
     chosen = (
@@ -108,6 +109,7 @@ def test_a_sweep_prints_json_and_results_reads_its_file(tmp_path: Path) -> None:
     assert len((tmp_path / "s.csv").read_text().splitlines()) == 9
 
 
+@pytest.mark.slow
 def test_a_sweep_shows_what_cannot_be_flown_and_judges_the_rest(tmp_path: Path) -> None:
     """A negative load is refused, one of 4 kg cannot be held by these drones' criteria, the others fly on."""
     arguments = ("sweep", "hover", "--over", "load.mass=-1,0.2", *SHORT, "--out", "s")
@@ -133,6 +135,7 @@ def test_a_sweep_shows_what_cannot_be_flown_and_judges_the_rest(tmp_path: Path) 
     assert colift(*judged, folder=tmp_path).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_comparison_outlives_a_side_study_that_cannot_be_set_up_and_a_field_that_holds_nothing(
     tmp_path: Path,
 ) -> None:

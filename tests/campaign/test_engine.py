@@ -115,6 +115,7 @@ def rows_of(file: Path) -> list[dict[str, Any]]:
         return []
 
 
+@pytest.mark.slow
 def test_killed_half_way_it_goes_on_and_counts_nothing_twice(
     tmp_path: Path, allocator: Write
 ) -> None:

@@ -251,6 +251,7 @@ def test_seeds_begin_where_they_are_told_to(tmp_path: Path) -> None:
         assert {row["seed"] for row in store.rows()} == {1000, 1001}
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_when_it_is_killed_half_way(tmp_path: Path) -> None:
     options = ["--seeds", "6", "--workers", "1", "--out", str(tmp_path), "--json"]
     file = tmp_path / "campaign.sqlite"

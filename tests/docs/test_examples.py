@@ -10,11 +10,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import colift
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
+@pytest.mark.slow
 def test_every_example_flies_twice(tmp_path: Path) -> None:
     environment = os.environ | {"COLIFT_CACHE": str(tmp_path)}
     for _ in range(2):  # compiled, then loaded

@@ -34,19 +34,22 @@ class Hand:
 
 
 Start = Callable[..., Hand]
+Write = Callable[[Recording], Path]
 
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Start]:
-    """``start("hover", speed=1.0, **overrides)``: a session of a mission; saves into the test's folder."""
+    """``start("hover", speed=1.0, **overrides)``: a session of a mission; saves into the test's folder, or by ``write``."""
     hands: list[Hand] = []
 
-    def begin(mission: str = "hover", *, speed: float = 1.0, **overrides: Any) -> Hand:
-        def write(recording: Recording) -> Path:
+    def begin(
+        mission: str = "hover", *, speed: float = 1.0, write: Write | None = None, **overrides: Any
+    ) -> Hand:
+        def save(recording: Recording) -> Path:
             return recording.save(tmp_path / f"flight-{len(list(tmp_path.iterdir()))}.h5")
 
         changes = {name.replace("__", "."): value for name, value in overrides.items()}
-        hand = Hand(Session(load_mission(mission, changes), write, speed))
+        hand = Hand(Session(load_mission(mission, changes), write or save, speed))
         hands.append(hand)
         return hand
 

@@ -14,6 +14,7 @@ from colift.errors import ColiftError  # noqa: E402
 from colift.record.recording import Recording  # noqa: E402
 from colift.show.live import server as module  # noqa: E402
 from colift.show.live.server import Server  # noqa: E402
+from colift.show.viewer.page import ASSETS  # noqa: E402
 
 PATIENCE = 60.0
 
@@ -158,9 +159,9 @@ async def test_only_pages_of_this_server_may_connect(web):
 
 @on_a_server
 async def test_assets_are_those_of_the_list(web):
-    web.server._assets = {"viewer.js": b"1"}
     answer, text = await web.get("assets/viewer.js")
-    assert (answer.status, text, answer.content_type) == (200, "1", "text/javascript")
+    assert (answer.status, answer.content_type) == (200, "text/javascript")
+    assert text == (ASSETS / "viewer.js").read_text()
     for path in (
         "assets/..%2fserver.py",
         "assets/../server.py",
@@ -276,11 +277,11 @@ async def test_a_silent_page_gets_no_more_and_the_flight_goes_on(web):
     for _ in range(module.UNACKNOWLEDGED):
         web.hand.fly(0.2)
         seq = (await page.next("rows", acknowledge=False))["seq"]
-    step = web.hand.session.flight._step
+    before = web.hand.session.flight.time
     for _ in range(20):
         web.hand.fly(1.0)
         await asyncio.sleep(module.FRAME)
-    assert web.hand.session.flight._step - step == pytest.approx(20_000, abs=50)
+    assert web.hand.session.flight.time - before == pytest.approx(20.0, abs=0.05)
     await page.next("state")
     await page.next("state")
     assert len([m for m in page.heard if m["type"] == "rows"]) == module.UNACKNOWLEDGED
@@ -418,7 +419,8 @@ async def test_the_first_message_must_be_a_greeting(web):
     await page.socket.send_bytes(b"\x00")
     assert await page.closed() == aiohttp.WSCloseCode.POLICY_VIOLATION
     assert web.server.refused["greeting"] == 4
-    assert web.server._clients == []
+    page = await web.open()
+    assert (await page.next("state"))["viewers"] == 1  # none of those
 
 
 @on_a_server

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -283,7 +285,7 @@ def test_whoever_reads_slowly_misses_rows_and_the_loop_does_not_notice(start):
             if hand is quick:
                 rows, seen = hand.session.rows(seen)
                 assert len(rows) <= 2
-    assert quick.session.flight._step == slow.session.flight._step
+    assert quick.session.flight.time == slow.session.flight.time
     rows, made = slow.session.rows(0)
     assert len(rows) == made
 
@@ -294,7 +296,7 @@ def test_memory_is_bounded(start, monkeypatch):
     hand.fly(10.0)
     flight = hand.session.flight
     assert flight.time - flight.recording().time[0] < 2.1
-    assert sum(len(leg.stretches) for leg in flight._legs) <= 102
+    assert sum(len(stretches) for _, _, stretches in flight.snapshot().legs) <= 102
     hand.do(lambda s: s.turn("load.mass", 0.25), seconds=3.0)
     assert hand.session.recording().mission.events[-1].field == "load.mass"
 
@@ -334,9 +336,9 @@ def test_a_saved_flight_flies_again_exactly_as_it_was_flown(start, tmp_path):
         hand.do(command, seconds=0.7)
     hand.fly(1.0)
     hand.do(lambda s: s.save())
-    hand.session.end(save=False)
+    said = hand.session.end(save=False)
     assert hand.refusals == []
-    saved = Recording.load(hand.session._saved)
+    saved = Recording.load(said.removeprefix("Saved "))
     assert [text for _, text in saved.commands][:2] == [
         "Alignment penalty mu 0.3 N^2", "Push of 0.539 N for 0.4 s",
     ]  # fmt: skip
@@ -364,16 +366,16 @@ def test_nothing_is_saved_before_something_was_flown(start):
         hand.session.recording()
 
 
+@pytest.mark.timeout(60)
 def test_a_disk_that_is_full_does_not_end_the_flight(start):
-    hand = start()
-
     def full(recording):
         raise OSError("No space left on device")
 
-    hand.session._write = full
+    hand = start(write=full)
     hand.fly(1.0)
     hand.do(lambda s: s.save())
-    hand.session._saving.result(timeout=60)
+    while not marks(hand, "fault"):
+        time.sleep(0.01)
     assert any("No space left" in text for text in marks(hand, "fault"))
     hand.fly(0.5)
     assert hand.session.flight.time > 1.5
@@ -398,23 +400,27 @@ class Ticks:
 
 
 def test_the_thread_keeps_an_error_and_says_that_it_has_ended():
-    ended = []
+    ended = threading.Event()
 
     def fail():
         raise RuntimeError("a part broke")
 
-    pilot = Pilot(Ticks(fail), lambda: ended.append(True))
+    pilot = Pilot(Ticks(fail), ended.set)
     pilot.start()
-    pilot._thread.join(timeout=30)
+    assert ended.wait(30.0)
     pilot.stop()
-    assert (ended, str(pilot.error)) == ([True], "a part broke")
+    assert str(pilot.error) == "a part broke"
 
 
 def test_the_thread_stops_when_it_is_told():
-    session = Ticks(lambda: None)
-    pilot = Pilot(session)
-    session.then = pilot._stop.set
+    flying, ended = threading.Event(), []
+    session = Ticks(flying.set)
+    pilot = Pilot(session, lambda: ended.append(True))
     pilot.start()
+    assert flying.wait(30.0)
+    assert ended == []
     pilot.stop()
-    assert session.ticks == 5
-    assert pilot.error is None
+    seen = session.ticks
+    time.sleep(0.05)
+    assert session.ticks == seen >= 5
+    assert (ended, pilot.error) == ([True], None)

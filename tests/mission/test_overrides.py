@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from itertools import permutations
 
 import pytest
@@ -174,8 +176,6 @@ def test_so_does_every_command(tmp_path):
         )
         assert json.loads(done.stdout), name
     assert 'kind = "motors"' in (tmp_path / "run" / "mission.toml").read_text()
-    from colift.study.campaign.store import Store
-
-    with Store(tmp_path / "stress" / "campaign.sqlite") as store:
-        ((mission,),) = store._db.execute("SELECT mission FROM runs").fetchall()
+    with closing(sqlite3.connect(tmp_path / "stress" / "campaign.sqlite")) as database:
+        ((mission,),) = database.execute("SELECT mission FROM runs").fetchall()
     assert json.loads(mission)["actuation"]["kind"] == "motors"

@@ -62,7 +62,7 @@ def test_a_part_of_the_same_kind_keeps_its_memory_another_forgets():
     assert flight.wires.allocation.params[0] == 0.4
     flight.change("allocation", {"kind": "sqp", "mu": 0.3})
     assert flight.parts["allocation"].mu == 0.3
-    assert len(flight._legs) == 2
+    assert len(flight.snapshot().legs) == 2
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_what_is_forgotten_is_gone_and_the_rest_is_whole():
     whole = flight.recording()
     flight.forget(0.5)
     kept = flight.recording()
-    assert len(flight._legs) == 1
+    assert len(flight.snapshot().legs) == 1
     assert kept.time[0] == pytest.approx(0.5)
     for name in ("load", "tensions", "allocator_status"):
         np.testing.assert_array_equal(kept[name], whole[name][-len(kept[name]) :])

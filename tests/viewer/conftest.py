@@ -16,6 +16,13 @@ from colift.show.viewer.browser import find_browser
 from colift.show.viewer.page import DRAWN, write_page
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever starts a browser is marked so."""
+    for item in items:
+        if "chromium" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.browser)
+
+
 @pytest.fixture(scope="session")
 def spiral() -> Recording:
     return fly()

@@ -58,6 +58,11 @@ def test_types_hold() -> None:
     npm("check")
 
 
+@built
+def test_the_logic_holds_without_a_browser() -> None:
+    npm("test")
+
+
 def test_the_licences_of_what_is_bundled_ship_with_it() -> None:
     text = (ASSETS / "LICENSES.txt").read_text()
     packages = json.loads((SOURCES / "package.json").read_text())["dependencies"]

@@ -8,6 +8,30 @@ import { FOLLOWING, KINDS } from "./tables";
 /** Width of a mark, and so the least distance of two, px. */
 const MARK = 18;
 
+/** A mark on the track: its place in percent, and how many others it stands for. */
+export interface Placed {
+  mark: Mark;
+  place: number;
+  others: number;
+}
+
+/** Causes of about the same time stand beside each other; what followed stands where there is room. */
+export function arrange(events: Mark[], part: (time: number) => number, apart: number): Placed[] {
+  const placed: Placed[] = [];
+  let taken = -Infinity;
+  for (const mark of events.filter(({ kind }) => !FOLLOWING.has(kind))) {
+    taken = Math.min(Math.max(part(mark.time), taken + apart), 100);
+    placed.push({ mark, place: taken, others: 0 });
+  }
+  for (const mark of events.filter(({ kind }) => FOLLOWING.has(kind))) {
+    const place = part(mark.time);
+    const near = placed.find((other) => Math.abs(other.place - place) < apart);
+    if (near) near.others += 1;
+    else placed.push({ mark, place, others: 0 });
+  }
+  return placed;
+}
+
 export class Timeline {
   readonly element: HTMLElement;
   private readonly toggle: HTMLButtonElement;
@@ -110,20 +134,8 @@ export class Timeline {
     this.marks.replaceChildren();
     const apart = (100 * MARK) / width;
     this.flights.forEach((flight, lane) => {
-      // Causes of about the same time stand beside each other; what followed stands where there is room.
-      const placed: { place: number; made: HTMLElement; others: number }[] = [];
-      let taken = -Infinity;
-      for (const mark of flight.events.filter(({ kind }) => !FOLLOWING.has(kind))) {
-        taken = Math.min(Math.max(this.part(mark.time), taken + apart), 100);
-        placed.push({ place: taken, made: this.mark(mark, flight, lane, taken), others: 0 });
-      }
-      for (const mark of flight.events.filter(({ kind }) => FOLLOWING.has(kind))) {
-        const place = this.part(mark.time);
-        const near = placed.find((other) => Math.abs(other.place - place) < apart);
-        if (near) near.others += 1;
-        else placed.push({ place, made: this.mark(mark, flight, lane, place), others: 0 });
-      }
-      for (const { made, others } of placed) {
+      for (const { mark, place, others } of arrange(flight.events, (time) => this.part(time), apart)) {
+        const made = this.mark(mark, flight, lane, place);
         if (others) made.title += ` (and ${others} more)`;
         this.marks.append(made);
       }
