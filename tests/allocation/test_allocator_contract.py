@@ -198,7 +198,14 @@ def test_kernel_allocates_no_memory(kind):
     noisy[5] = np.nan
     noisy[6] = 0.0
     outputs = (cell.tensions, cell.directions, cell.info)
-    bound = (address_of(kernel), np.zeros((4, 3)), cell.part.params(cell.team), cell.memory)
+    nothing = np.full((4, 3, 3), np.nan)
+    bound = (
+        address_of(kernel),
+        np.zeros((4, 3)),
+        nothing,
+        cell.part.params(cell.team),
+        cell.memory,
+    )
     calls(1, noisy, *bound, *outputs)
     enabled = _nrt_python.memsys_stats_enabled()
     _nrt_python.memsys_enable_stats()

@@ -35,10 +35,10 @@ class Mission(Described):
     """Name of the part in each layer."""
     list_kinds: dict[str, list[str]]
     """Names of the disturbances and faults, in their order."""
-    reference: SerializeAsAny[ReferencePart]
     sensing: SerializeAsAny[SensingPart]
     estimation: SerializeAsAny[EstimationPart]
     supervision: SerializeAsAny[SupervisionPart]
+    reference: SerializeAsAny[ReferencePart]
     load_control: SerializeAsAny[LoadControlPart]
     allocation: SerializeAsAny[AllocatorPart]
     link: SerializeAsAny[LinkPart]

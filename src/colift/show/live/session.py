@@ -292,7 +292,7 @@ class Session:
         place = ", ".join(f"{x:.2f}" for x in position)
         self._steering = False
         self._guide(
-            self._guided().towards(position, self.flight.time, self._reference()),
+            self._guided().towards(position, self.flight.clock, self._reference()),
             f"Fly to ({place}) m",
         )
 
@@ -306,7 +306,7 @@ class Session:
             return
         speed = float(np.linalg.norm(velocity))
         text = f"Steer at {speed:.2f} m/s" if speed else "Stop"
-        self._guide(guided.along(velocity, self.flight.time, self._reference()), text)
+        self._guide(guided.along(velocity, self.flight.clock, self._reference()), text)
 
     def save(self) -> None:
         """Write the flight so far to a file, in a thread of its own."""
@@ -386,7 +386,7 @@ class Session:
         """Position and derivatives (4, 3) that the reference has now."""
         part = self.flight.parts["reference"]
         assert isinstance(part, ReferencePart)
-        return np.asarray(part.sample(np.array([self.flight.time]), self.mission.team)[0])
+        return np.asarray(part.sample(np.array([self.flight.clock]), self.mission.team)[0])
 
     def _guided(self) -> Guided:
         part = self.flight.parts["reference"]
