@@ -73,6 +73,37 @@ def test_derivatives_follow_a_clock_that_runs_slowly():
         )
 
 
+def test_what_is_set_once_follows_the_clock_once():
+    """A reference that is not written anew is not slowed down again at each step."""
+
+    def half(now, sees, params, memory, writes):
+        writes.clock[0], writes.clock[1] = 0.5 * now.time, 0.5
+
+    class Half(SupervisionPart):
+        """Half as fast."""
+
+        kernel = staticmethod(half)
+
+    register("half", Half)
+    flight = Flight(
+        load_mission("hover", {"supervision.kind": "half", "reference": {"kind": "external"}})
+    )
+    course = np.arange(12.0).reshape(4, 3)
+    pulls = _pulls(0.3, 4)
+    flight.act("reference", reference=course, nominal_forces=pulls)
+    before = flight.snapshot()
+    for _ in range(2):
+        flight.advance(0.05)
+        powers = np.array([1.0, 0.5, 0.25, 0.125])
+        assert np.array_equal(flight.bus.reference, powers[:, None] * course)
+        assert np.array_equal(flight.bus.nominal_forces, powers[:3, None] * pulls)
+        assert flight.clock == pytest.approx(0.5 * flight.time)
+        flight.regroup(flight.drones)
+        flight.act("reference", nominal_forces=pulls)  # a new team, a new plan
+    flight.restore(before)
+    assert np.array_equal(flight.wires.reference.writes.reference, course)
+
+
 # ---------------------------------------------------------------- a plan's nominal forces
 
 WEIGHT, TURN = 0.225 * 9.81, 2.0
@@ -165,8 +196,8 @@ def test_an_external_layer_does_what_it_is_told():
 @pytest.mark.parametrize(
     ("layer", "signals"),
     [
-        ("reference", {"reference": np.zeros((4, 3))}),
-        ("supervision", {"clock": [0.0, 0.0]}),
+        ("reference", {"reference": np.eye(4, 3)}),
+        ("supervision", {"clock": [2.0, 0.0]}),
         ("estimation", {"estimated_load": np.zeros((2, 3))}),
         ("allocation", {"desired_tensions": np.full(4, 0.7)}),
         ("position_control", {"thrusts": np.full(4, 5.0)}),

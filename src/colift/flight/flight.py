@@ -91,7 +91,8 @@ class Flight:
         """Time that the reference is given now, s: the flight's, unless a supervisor has held it."""
         if self._step == 0:
             return 0.0
-        return self.time + (float(self.bus.clock[0]) - (self._step - 1) * self._every.step)
+        (clock, rate), step = self.bus.clock.tolist(), self._every.step
+        return float(self.time + (clock - (self._step - 1) * step) - (1.0 - rate) * step)
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -188,14 +189,15 @@ class Flight:
             For a value of another shape, or one that is not finite.
 
         """
-        part = self._parts.get(layer)
-        if part is None or getattr(type(part).kernel, "py_func", None) not in (hold, hold_answer):
+        kernel = type(self._parts[layer]).kernel if layer in self._parts else None
+        if getattr(kernel, "py_func", kernel) not in (hold, hold_answer):
             raise ColiftError(f'{layer}: only a layer of kind "external" is driven from outside')
         if unknown := {*signals} - {*PORTS[layer].writes}:
             raise ColiftError(
                 f"{layer}: writes {', '.join(PORTS[layer].writes)}, not {', '.join(sorted(unknown))}"
             )
-        places = {name: getattr(self.bus, name) for name in signals}
+        writes = getattr(self.wires, layer).writes
+        places = {name: getattr(writes, name) for name in signals}
         values = {name: numbers(name, value, places[name].shape) for name, value in signals.items()}
         for name, value in values.items():
             places[name][:] = value
@@ -272,6 +274,7 @@ class Flight:
             else:
                 now[:] = before
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
+        self.wires.reference.writes.reference[:] = old.circuit.wires.reference.writes.reference
 
     def recording(self, since: float = 0.0) -> Recording:
         """What has been recorded, from ``since`` (s) on; NaN for a drone that has left."""
@@ -505,8 +508,7 @@ def start_state(mission: Mission) -> Start:
     first = mission.reference.sample(np.zeros(1), team)[0]
     weight = [0.0, 0.0, team.load_mass * team.gravity]
     tensions = np.maximum(min_norm_tensions(directions, weight), 0.0)
-    thrust = -tensions[:, None] * directions
-    thrust[:, 2] += team.masses * team.gravity
+    thrust = team.hover_forces(tensions, directions)
     norms = np.linalg.norm(thrust, axis=1, keepdims=True)
     upward = np.array([0.0, 0.0, 1.0])
     aim = np.where(norms > 1e-9, thrust / np.maximum(norms, 1e-9), upward)

@@ -61,7 +61,7 @@ class Leg:
         wires = (*self.circuit.wires, *self.circuit.disturbances)
         vectors = [each for wire in wires for each in (wire.params, wire.memory)]
         hidden = (getattr(self.bus, signal.name) for signal in HIDDEN)
-        return [self.bus.row, *hidden, *vectors]
+        return [self.bus.row, *hidden, *self.circuit.wires.reference.writes, *vectors]
 
 
 def due_rows(first: int, stop: int, period: int) -> int:

@@ -17,13 +17,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from colift.catalogue import LAYERS
 from colift.control.allocation.base import INFO_SIZE, Status
 from colift.errors import ColiftError
-from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns, vector
-from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named
+from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
+from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named, type_of
 from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
 from colift.world.disturbance import push
 
@@ -43,6 +44,7 @@ Common = named_tuple(
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
         "peak_tensions", "catch_impulses", "carrying", "clock", "reference",
+        "nominal_forces",
     ],
     __name__,
 )  # fmt: skip
@@ -70,10 +72,7 @@ SIGNATURE = i8(
     named([PORTS[name].type for name in Wires._fields], Wires),
     i8,
     types.UniTuple(PORTS["disturbance"].type, MAX_DISTURBANCES),
-    named(
-        [matrix if name in {"external_forces", "reference"} else vector for name in Common._fields],
-        Common,
-    ),
+    named([type_of(name) for name in Common._fields], Common),
     matrix,
     matrix,
 )
@@ -88,6 +87,20 @@ _control_position = PORTS["position_control"].invoke
 _control_attitude = PORTS["attitude_control"].invoke
 _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
 _disturb = PORTS["disturbance"].invoke
+
+
+@register_jitable  # plain Python in the plain loop
+def _follow_clock(course, rate, reference, nominal):  # type: ignore[no-untyped-def]
+    """From derivatives along the reference's clock, which runs at this rate, to those in time."""
+    power = 1.0
+    for m in range(4):
+        for j in range(3):
+            reference[m, j] = power * course.reference[m, j]
+        if m < 3:
+            for i in range(nominal.shape[0]):
+                for j in range(3):
+                    nominal[i, m, j] = power * course.nominal_forces[i, m, j]
+        power *= rate
 
 
 @kernel(SIGNATURE, counted=False)
@@ -108,12 +121,7 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
         _estimate(wires.estimation, k, t, dt)
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
-        if bus.clock[1] != 1.0:  # from derivatives along the clock to those in time
-            rate = 1.0
-            for m in range(1, 4):
-                rate *= bus.clock[1]
-                for j in range(3):
-                    bus.reference[m, j] *= rate
+        _follow_clock(wires.reference.writes, bus.clock[1], bus.reference, bus.nominal_forces)
 
         if k % every.load_control == 0:
             _control_load(wires.load_control, k, t, every.load_control * dt)
@@ -202,10 +210,13 @@ def circuit(
 
     """
     signals = bus._asdict()
+    # The reference writes along its clock, into arrays of its own; the loop makes those of the bus of them.
+    course = {name: signals[name].copy() for name in PORTS["reference"].writes}
     wires = {
         name: PORTS[name].wire(
             _checked(layer, parts[layer], function, PORTS[name].signature),
-            params[layer], memory[layer], signals, key=keys[layer],
+            params[layer], memory[layer], signals | course if name == "reference" else signals,
+            key=keys[layer],
         )
         for name, (layer, function) in FUNCTIONS.items()
     }  # fmt: skip

@@ -82,9 +82,13 @@ def _tuple(name: str, signals: Iterable[str]) -> Any:
     return made
 
 
+def type_of(name: str) -> Any:
+    """Numba's type of the array of a signal; the bus's row is one too."""
+    return vector if name == "row" else (vector, matrix, tensor)[len(_SIGNALS[name].shape) - 1]
+
+
 def _type(made: Any) -> Any:
-    arrays = (vector, matrix, tensor)
-    return named((arrays[len(_SIGNALS[name].shape) - 1] for name in made._fields), made)
+    return named(map(type_of, made._fields), made)
 
 
 def _invoke(signature: Any) -> Callable[[Wire, int, float, float], Any]:

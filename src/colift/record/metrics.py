@@ -26,6 +26,8 @@ _WITHIN_LIMITS = (int(Status.FORCE_REDUCED), int(Status.RECOVERING))
 
 def _metric(formula: Callable[[Recording], float]) -> None:
     """The formula of the metric of its name in :data:`colift.mission.criteria.METRICS`."""
+    if formula.__name__ not in {metric.name for metric in METRICS}:
+        raise KeyError(f"{formula.__name__}: the table of metrics has no such line")
     _FORMULAS[formula.__name__] = formula
 
 

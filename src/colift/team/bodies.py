@@ -74,13 +74,19 @@ class Team:
     def hover_thrusts(
         self, tensions: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Thrust of each drone (n,), N, that holds its own weight and the pull of its cable.
+        """Sizes of :meth:`hover_forces` (n,), N."""
+        return np.asarray(np.linalg.norm(self.hover_forces(tensions, directions), axis=1))
+
+    def hover_forces(
+        self, tensions: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Thrust of each drone (n, 3), world frame, N, that holds its own weight and the pull of its cable.
 
         ``tensions`` (n,), N, along ``directions`` (n, 3), from the drones to the load.
         """
-        thrust = -tensions[:, None] * directions
+        thrust = np.asarray(-tensions[:, None] * directions)
         thrust[:, 2] += self.masses * self.gravity
-        return np.asarray(np.linalg.norm(thrust, axis=1))
+        return thrust
 
     @classmethod
     def uniform(
