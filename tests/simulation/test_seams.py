@@ -12,6 +12,7 @@ from colift.control.reference.base import ReferencePart
 from colift.control.supervision.base import SupervisionPart
 from colift.errors import ColiftError, SettingError
 from colift.flight.flight import Flight
+from colift.kernel.jit import JIT_ENABLED
 from colift.kernel.status import Status
 from colift.mission import load_mission
 from colift.part import register
@@ -183,7 +184,7 @@ def test_planned_motion_of_the_cables_is_fed_forward_unfiltered(controller):
 def test_an_external_layer_does_what_it_is_told():
     settings = {**IDEAL, "timing.duration": 1.0, "load_control.kind": "external"}
     flight = Flight(load_mission("hover", settings))
-    assert flight.compiled
+    assert flight.compiled == JIT_ENABLED
     for factor in (1.01, 0.9):
         force = [0.0, 0.0, factor * WEIGHT]
         flight.act("load_control", force=force)
@@ -210,7 +211,7 @@ def test_every_layer_of_the_controllers_can_be_driven(layer, signals):
     flight.advance(0.05)
     for name, value in signals.items():
         assert np.array_equal(getattr(flight.bus, name), value)
-    assert flight.compiled
+    assert flight.compiled == JIT_ENABLED
 
 
 def test_what_nobody_drives_from_outside_is_refused():
