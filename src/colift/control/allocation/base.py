@@ -47,9 +47,7 @@ def unplanned(n):  # type: ignore[no-untyped-def]
     return np.full((n, 3, 3), np.nan)
 
 
-@kernel(
-    i8(i8, vector, matrix, tensor, f8, vector, vector, vector, matrix, vector), counted=False
-)
+@kernel(i8(i8, vector, matrix, tensor, f8, vector, vector, vector, matrix, vector), counted=False)
 def _ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
     """:func:`ask` from Python, to which plain arrays are quicker than named tuples of them."""
     return ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info)

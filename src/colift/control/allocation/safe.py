@@ -55,7 +55,7 @@ C, L, N, P = MEMORY.at, LIMIT.at, PAIR.at, cycle.PARAMS.at
 CABLES, LIMITS, PAIRS = MEMORY.spans, LIMIT.spans, PAIR.spans
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     force, acceleration = sees.force, sees.reference[2]

@@ -40,7 +40,7 @@ A team that changes starts anew."""
 P, M, SPANS = PARAMS.at, MEMORY.at, MEMORY.spans
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     force = sees.force
     tensions, directions = writes.desired_tensions, writes.desired_directions

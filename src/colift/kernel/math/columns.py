@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from colift.kernel.jit import inline
+from colift.kernel.jit import splice
 
 
-@inline
+@splice
 def column(vector, begin, count, span):  # type: ignore[no-untyped-def]
     """All that ``count`` rows from ``begin`` on have of one field, where fields stand one after the other."""
     place, size = span
