@@ -15,7 +15,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from colift.catalogue import DEFAULT_KINDS
 from colift.kernel.ports import PORTS
-from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, Signal
+from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, Signal
 from colift.mission import Mission, schema
 from colift.mission.criteria import METRICS
 from colift.part import FOLDERS, find, names
@@ -136,6 +136,14 @@ class SignalTable(SphinxDirective):
             for s in (*SIGNALS, *CYCLE_SIGNALS)
         ]
         return [table(["symbol", "name", "shape", "unit", "frame", "meaning"], rows)]
+
+
+class HiddenTable(SphinxDirective):
+    """What flows between the layers without being recorded."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = [[code(s.name), code(shape_text(s)), s.unit, s.frame, s.meaning] for s in HIDDEN]
+        return [table(["name", "shape", "unit", "frame", "meaning"], rows)]
 
 
 class QuantityTable(SphinxDirective):
@@ -365,6 +373,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("port-table", PortTable)
     app.add_directive("signal-table", SignalTable)
+    app.add_directive("hidden-table", HiddenTable)
     app.add_directive("quantity-table", QuantityTable)
     app.add_directive("recording-layout", RecordingLayout)
     app.add_directive("metric-table", MetricTable)

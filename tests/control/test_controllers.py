@@ -173,7 +173,7 @@ class Drones:
     def __call__(self, x, v, reference, T, alpha, dt=0.001):
         self.part.call(
             self.team, self.memory, dt=dt, estimated_positions=x, estimated_velocities=v,
-            estimated_attitudes=self.attitudes, estimated_rates=self.rates, reference=reference,
+            estimated_attitudes=self.attitudes, estimated_rates=self.rates, wanted_ends=np.tile(reference[:3], (self.team.n, 1, 1)),
             received_tensions=T, received_directions=alpha, drone_forces=self.forces,
             thrusts=self.thrusts, desired_attitudes=self.attitudes, desired_rates=self.rates,
         )  # fmt: skip

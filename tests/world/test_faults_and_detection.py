@@ -294,7 +294,7 @@ def alarms(distances, dt=0.005):
         load = np.array([[0.0, 0.0, -d], [0.0, 0.0, -speed]])
         hover = np.array([team.masses[0] * team.gravity])
         part.call(
-            team, memory, dt=dt, estimated_load=load, estimated_attitudes=q, thrusts=hover,
+            team, memory, dt=dt, estimated_ends=load[None], estimated_attitudes=q, thrusts=hover,
             received_directions=down, carrying=carrying,
         )  # fmt: skip
         found.append(carrying[0] == 0.0)
@@ -339,7 +339,7 @@ class Hovering:
         x, y, z = (wanted / self.thrusts[:, None]).T
         quaternions = np.stack([1.0 + z, -y, x, np.zeros(n)], axis=1)
         self.attitudes = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
-        self.load, self.velocities = np.zeros((2, 3)), np.zeros((n, 3))
+        self.ends, self.velocities = np.zeros((n, 2, 3)), np.zeros((n, 3))
         self.positions = -self.directions
         self.memory = self.part.memory(self.team)
         self.carrying = np.ones(n)
@@ -352,7 +352,7 @@ class Hovering:
             if moving:
                 self.positions += self.DT * self.velocities
             self.part.call(
-                self.team, self.memory, dt=self.DT, estimated_load=self.load,
+                self.team, self.memory, dt=self.DT, estimated_ends=self.ends,
                 estimated_positions=self.positions, estimated_velocities=self.velocities,
                 estimated_attitudes=self.attitudes, thrusts=self.thrusts,
                 received_tensions=self.tensions, received_directions=self.directions,
@@ -399,8 +399,8 @@ def test_a_gust_pushes_all_and_nobody_is_lost():
     assert flight.fly(1.0) is None
     push = np.tile([flight.m * flight.g, 0.0, 0.0], (4, 1))
     for share in np.linspace(0.0, 1.0, 60):
-        flight.load[1] = flight.velocities[0]  # which takes the load along
-        flight.load[0] = flight.positions.mean(axis=0) + [0.0, 0.0, flight.directions[0, 2]]
+        flight.ends[:, 1] = flight.velocities[0]  # which takes the load along
+        flight.ends[:, 0] = flight.positions.mean(axis=0) + [0.0, 0.0, flight.directions[0, 2]]
         assert flight.fly(flight.DT, share * push) is None
 
 
@@ -437,7 +437,7 @@ def test_a_drone_that_says_it_moves_and_stands_is_not_measured_any_more():
         flight = Hovering(np.zeros((4, 3)))
         flight.fly(0.5)
         flight.velocities[:] = [speed, 0.0, 0.0]
-        flight.load[1, 0] = speed
+        flight.ends[:, 1, 0] = speed
         flight.velocities[[0, 1, 3]] *= 1.0 + 1e-9  # the others' numbers change, if little
         found = None
         for _ in range(100):
@@ -451,7 +451,7 @@ def test_a_drone_that_says_it_moves_and_stands_is_not_measured_any_more():
     # In balance it stands for as long as it likes, and so it may where this is not looked at.
     assert Hovering(np.zeros((4, 3))).fly(5.0) is None
     flight = Hovering(np.zeros((4, 3)), astray=0.0)
-    flight.velocities[:, 0] = flight.load[1, 0] = 0.5
+    flight.velocities[:, 0] = flight.ends[:, 1, 0] = 0.5
     assert flight.fly(2.0, moving=False) is None
 
 

@@ -217,6 +217,11 @@ export class Flight {
   }
 }
 
+/** Where cable i ends on the load: a point load has one place for all. */
+export function cableEnd(frame: Frame, _i: number): ArrayLike<number> {
+  return frame.load;
+}
+
 /** Attitudes between two rows: quaternions of opposite sign are the same attitude. */
 function turn(out: Float32Array, column: Column, row: number, next: number, part: number): void {
   for (let i = 0; i < out.length; i += 4) {

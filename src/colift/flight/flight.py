@@ -19,7 +19,7 @@ from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
 from colift.flight.membership import Membership
 from colift.interrupts import heard
 from colift.kernel.ports import PORTS, hold, hold_answer
-from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS, columns, make_bus
+from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
 from colift.mission.schema import Event
 from colift.mission.warnings import warnings_of
@@ -266,7 +266,7 @@ class Flight:
         }
         self._begin_leg(drones, memory)
         bus = self.bus
-        for signal in SIGNALS:
+        for signal in (*HIDDEN, *SIGNALS):
             now, before = getattr(bus, signal.name), getattr(old.bus, signal.name)
             if signal.shape[0] in {"n", "n+1"}:
                 now[: team.n][~new] = before[stay]

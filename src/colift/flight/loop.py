@@ -24,6 +24,7 @@ from colift.catalogue import LAYERS
 from colift.control.allocation.base import INFO_SIZE, Status
 from colift.errors import ColiftError
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
+from colift.kernel.load import ends_of
 from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named, type_of
 from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
 from colift.world.disturbance import push
@@ -44,7 +45,7 @@ Common = named_tuple(
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
         "peak_tensions", "catch_impulses", "carrying", "clock", "reference",
-        "nominal_forces",
+        "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends",
     ],
     __name__,
 )  # fmt: skip
@@ -119,9 +120,11 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
         _observe(wires.plant_observe, k, t, dt)
         _sense(wires.sensing, k, t, dt)
         _estimate(wires.estimation, k, t, dt)
+        ends_of(bus.estimated_load, bus.estimated_ends)
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
         _follow_clock(wires.reference.writes, bus.clock[1], bus.reference, bus.nominal_forces)
+        ends_of(bus.reference, bus.wanted_ends)
 
         if k % every.load_control == 0:
             _control_load(wires.load_control, k, t, every.load_control * dt)

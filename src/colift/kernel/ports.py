@@ -217,21 +217,24 @@ PORTS: dict[str, Port] = {
         Port("link", sees=("desired_tensions", "desired_directions")),
         Port(
             "position_control",
-            sees=(*_named("estimated")[1:], "reference", "nominal_forces", *_RECEIVED),
+            sees=(*_named("estimated")[1:], "wanted_ends", "nominal_forces", *_RECEIVED),
         ),
         Port(
             "attitude_control",
             sees=("estimated_attitudes", "estimated_rates", "desired_attitudes", "desired_rates"),
         ),
         Port("actuation", sees=("thrusts", "torques", "motor_health")),
-        Port("detection", sees=(*_named("estimated")[:4], "thrusts", *_RECEIVED)),
+        Port(
+            "detection",
+            sees=("estimated_ends", *_named("estimated")[1:4], "thrusts", *_RECEIVED),
+        ),
         Port("plant_observe", sees=()),
         Port("plant", sees=("applied_thrusts", "applied_torques", "external_forces", "attached")),
         Port(
             "disturbance",
             sees=(
-                "load", "positions", "velocities", "attitudes", "directions", "direction_rates",
-                "applied_thrusts", "attached",
+                "load", "ends", "positions", "velocities", "attitudes", "directions",
+                "direction_rates", "applied_thrusts", "attached",
             ),
         ),
     )

@@ -38,7 +38,7 @@ class Signal:
     each: str = "row"
     """Recorded in each ``"row"`` of the log, or for each ``"allocation"``."""
     writer: str = ""
-    """Port whose kernel writes it (:data:`colift.kernel.ports.PORTS`); none for what faults change."""
+    """Port whose kernel writes it (:data:`colift.kernel.ports.PORTS`); none for what faults change or the loop writes."""
 
     def shape_for(self, n: int) -> tuple[int, ...]:
         """Shape with the number of drones filled in."""
@@ -120,7 +120,14 @@ NOMINAL = Signal(
 )
 """Not recorded: what follows a plan has it on file."""
 
-HIDDEN = (ANSWER, NOMINAL)
+ENDS = (
+    Signal("ends", ("n", 2, 3), "m, m/s", "-", "world", "places and velocities of the cables' ends on the load", writer="plant_observe"),
+    Signal("estimated_ends", ("n", 2, 3), "m, m/s", "-", "world", "those that the controllers use, of the estimated load"),
+    Signal("wanted_ends", ("n", 3, 3), "m, m/s, m/s^2", "-", "world", "those of the wanted load, with accelerations"),
+)  # fmt: skip
+"""Not recorded, as they follow from the load (:mod:`colift.kernel.load`); the loop writes those without a writer."""
+
+HIDDEN = (ANSWER, NOMINAL, *ENDS)
 """Signals of the bus that stand outside of its row."""
 
 CYCLE_SIGNALS = tuple(

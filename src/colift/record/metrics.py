@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from colift.errors import AbsentSignalError
 from colift.kernel.status import Status
 from colift.mission.criteria import METRICS
+from colift.record.ends import cable_ends
 from colift.record.recording import Recording
 from colift.team.geometry import pairwise_angles
 
@@ -161,11 +162,12 @@ def min_drone_distance_m(r: Recording) -> float:
 
 @_metric
 def min_cable_distance_m(r: Recording) -> float:
-    positions, load = r["positions"], r["load"][:, 0]
+    positions = r["positions"]
     n = positions.shape[1]
     if n < 2:
         return float("nan")
-    cables = np.where(r["attached"][..., None] == 0.0, np.nan, load[:, None] - positions)
+    spans = cable_ends(r)[:, :, 0] - positions
+    cables = np.where(r["attached"][..., None] == 0.0, np.nan, spans)
     least = math.inf
     for part in _pairs_in_slices(len(positions), n):
         away = positions[part, :, None] - positions[part, None]  # of drone i from drone j

@@ -1,7 +1,7 @@
-// Pairs of cables closer than the safe angle: a filled sector at the load, with the angle written.
+// Pairs of cables closer than the safe angle: a filled sector at the first one's end, with the angle written.
 
 import { BufferGeometry, DoubleSide, Float32BufferAttribute, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, Vector3 } from "three";
-import { angleBetween } from "../data";
+import { angleBetween, cableEnd } from "../data";
 import { MOST_PAIRED } from "../tables";
 import type { Maker } from "./element";
 
@@ -19,7 +19,7 @@ export const angles: Maker = (flight) => {
   sectors.frustumCulled = edges.frustumCulled = false;
   object.add(sectors, edges);
 
-  const load = new Vector3();
+  const end = new Vector3();
   const [a, b, p, q] = [new Vector3(), new Vector3(), new Vector3(), new Vector3()];
   const radius = 0.5 * Math.min(...flight.info.cable_lengths);
   return {
@@ -42,19 +42,19 @@ export const angles: Maker = (flight) => {
       }
       object.visible = close.length > 0;
       if (!object.visible) return;
-      load.fromArray(frame.load);
       const triangles: number[] = [];
       const rims: number[] = [];
       for (const [angle, i, j] of close) {
+        end.fromArray(cableEnd(frame, i));
         a.fromArray(frame.directions, 3 * i).multiplyScalar(-radius);
         b.fromArray(frame.directions, 3 * j).multiplyScalar(-radius);
         for (let k = 0; k < STEPS; k++) {
-          p.lerpVectors(a, b, k / STEPS).setLength(radius).add(load);
-          q.lerpVectors(a, b, (k + 1) / STEPS).setLength(radius).add(load);
-          triangles.push(...load, ...p, ...q);
+          p.lerpVectors(a, b, k / STEPS).setLength(radius).add(end);
+          q.lerpVectors(a, b, (k + 1) / STEPS).setLength(radius).add(end);
+          triangles.push(...end, ...p, ...q);
           rims.push(...p, ...q);
         }
-        p.addVectors(a, b).setLength(1.12 * radius).add(load);
+        p.addVectors(a, b).setLength(1.12 * radius).add(end);
         labels.put(`${angle.toFixed(1)}\u00b0`, p, "angle");
       }
       sectors.geometry.setAttribute("position", new Float32BufferAttribute(triangles, 3));

@@ -4,6 +4,7 @@ import { Group, Vector3 } from "three";
 import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
 import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeometry.js";
+import { cableEnd } from "../data";
 import { tensionColour, theme, type Palette } from "../theme";
 import type { Maker } from "./element";
 
@@ -32,9 +33,9 @@ export const cables: Maker = (flight) => {
       const straight: number[] = [];
       const colours: number[] = [];
       const sagging: number[] = [];
-      to.fromArray(frame.load);
       for (let i = 0; i < frame.n; i++) {
         from.fromArray(frame.positions, 3 * i);
+        to.fromArray(cableEnd(frame, i));
         const tension = frame.tensions[i]!;
         if (!Number.isFinite(from.lengthSq() + to.lengthSq())) continue;
         if (!Number.isFinite(tension) || tension > SLACK * flight.full) {

@@ -61,7 +61,7 @@ def _lacking(i, axis, windy, across, along, memory):  # type: ignore[no-untyped-
 @kernel(SIGNATURE)
 def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
-    load, positions = sees.estimated_load, sees.estimated_positions
+    ends, positions = sees.estimated_ends, sees.estimated_positions
     velocities, attitudes = sees.estimated_velocities, sees.estimated_attitudes
     thrusts, tensions = sees.thrusts, sees.received_tensions
     carrying = writes.carrying
@@ -75,7 +75,8 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         o = M.rows + M.width * i
         m = params[P.rows + P.width * i + P.m]
         x, y, z = (
-            load[0, 0] - positions[i, 0], load[0, 1] - positions[i, 1], load[0, 2] - positions[i, 2]
+            ends[i, 0, 0] - positions[i, 0], ends[i, 0, 1] - positions[i, 1],
+            ends[i, 0, 2] - positions[i, 2],
         )  # fmt: skip
         d = max(math.sqrt(x * x + y * y + z * z), 1e-9)
         alpha = (x / d, y / d, z / d)
@@ -89,7 +90,7 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 memory[o + M.velocity + k] = velocities[i, k]
         speed = went = 0.0
         for k in range(3):
-            speed += alpha[k] * (load[1, k] - velocities[i, k])
+            speed += alpha[k] * (ends[i, 1, k] - velocities[i, k])
             expected = (thrusts[i] * axis[k] + tensions[i] * alpha[k]) / m
             if k == 2:
                 expected -= g
@@ -160,7 +161,7 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 class Residuals(DetectionPart):
     """A cable is gone when its ends move apart; a drone is gone when its acceleration lacks its thrust.
 
-    First: the distance between drone and load is constant while the cable is taut, whatever the wind and the
+    First: the distance between the ends of a cable is constant while the cable is taut, whatever the wind and the
     masses. It grows beyond the learned length, at some speed, when the cable is cut. If that of more than half of
     the team changes, the load's sensors are suspected instead and no cable is. Ends that slow down have been caught
     by their cable; late measurements, carried forward, overshoot its length meanwhile.

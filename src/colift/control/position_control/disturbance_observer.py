@@ -105,7 +105,7 @@ def _common_wind(n, params, memory):  # type: ignore[no-untyped-def]
 def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     x, v, q = sees.estimated_positions, sees.estimated_velocities, sees.estimated_attitudes
-    Omega, reference, T = sees.estimated_rates, sees.reference, sees.received_tensions
+    Omega, ends, T = sees.estimated_rates, sees.wanted_ends, sees.received_tensions
     alpha = sees.received_directions
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
@@ -130,8 +130,8 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
         push = missing = 0.0
         for k in range(3):
             a, d = memory[o + M.direction + k], memory[o + M.force + k]
-            x_e = x[i, k] - (reference[0, k] - L * a)
-            v_e = v[i, k] - (reference[1, k] - L * memory[o + M.direction + 3 + k])
+            x_e = x[i, k] - (ends[i, 0, k] - L * a)
+            v_e = v[i, k] - (ends[i, 1, k] - L * memory[o + M.direction + 3 + k])
             u[i, k] = -params[P.velocity] * (v_e + params[P.position] * x_e)
             push += u[i, k] * u[i, k]
             missing += a * (wind[k] - d)
@@ -139,7 +139,7 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
         share = min(1.0, params[P.max_push] / math.sqrt(max(push, 1e-12)))
         for k in range(3):
             a, d = memory[o + M.direction + k], memory[o + M.force + k]
-            needed = reference[2, k] - L * memory[o + M.direction + 6 + k] + (g if k == 2 else 0.0)
+            needed = ends[i, 2, k] - L * memory[o + M.direction + 6 + k] + (g if k == 2 else 0.0)
             u[i, k] = m * (needed + share * u[i, k]) - T[i] * a - (d + missing * a)
         least, most = m * g * params[P.min_thrust], m * g * params[P.max_thrust]
         _limit(i, u, least, most, params[P.tangent])

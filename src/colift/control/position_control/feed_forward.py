@@ -29,7 +29,7 @@ P, M = PARAMS.at, MEMORY.at
 @kernel(SIGNATURE)
 def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
-    x, v, reference = sees.estimated_positions, sees.estimated_velocities, sees.reference
+    x, v, ends = sees.estimated_positions, sees.estimated_velocities, sees.wanted_ends
     T, alpha = sees.received_tensions, sees.received_directions
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
@@ -49,9 +49,9 @@ def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped
         norm = 0.0
         for k in range(3):
             # The drone's place, velocity and acceleration at the end of the filtered cable.
-            x_e = x[i, k] - (reference[0, k] - L_i * memory[a + k])
-            v_e = v[i, k] - (reference[1, k] - L_i * memory[a + 3 + k])
-            acceleration = reference[2, k] - L_i * memory[a + 6 + k]
+            x_e = x[i, k] - (ends[i, 0, k] - L_i * memory[a + k])
+            v_e = v[i, k] - (ends[i, 1, k] - L_i * memory[a + 3 + k])
+            acceleration = ends[i, 2, k] - L_i * memory[a + 6 + k]
             memory[S + k] = min(max(memory[S + k] + dt * x_e, -limit), limit)
             gravity = g if k == 2 else 0.0
             u[i, k] = (

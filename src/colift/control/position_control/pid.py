@@ -31,7 +31,7 @@ P, M = PARAMS.at, MEMORY.at
 @kernel(SIGNATURE)
 def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
-    x, v, reference = sees.estimated_positions, sees.estimated_velocities, sees.reference
+    x, v, ends = sees.estimated_positions, sees.estimated_velocities, sees.wanted_ends
     T, alpha = sees.received_tensions, sees.received_directions
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
@@ -53,13 +53,13 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             rate = rates_on * (alpha[i, k] - memory[a + k]) / dt
             memory[a_dot + k] = keep_alpha * memory[a_dot + k] + (1.0 - keep_alpha) * rate
             memory[a + k] = alpha[i, k]
-            x_e = x[i, k] - (reference[0, k] - L_i * alpha[i, k])
-            v_e = v[i, k] - (reference[1, k] - L_i * memory[a_dot + k])
+            x_e = x[i, k] - (ends[i, 0, k] - L_i * alpha[i, k])
+            v_e = v[i, k] - (ends[i, 1, k] - L_i * memory[a_dot + k])
             memory[S + k] = min(max(memory[S + k] + dt * x_e, -limit), limit)
             gravity = g if k == 2 else 0.0
             # u_i = m_i (g e3 + xdd_Ld) - T_id alpha_id - k_p x_e - k_d xdot_e - k_i int x_e
             u[i, k] = (
-                m_i * (gravity + reference[2, k])
+                m_i * (gravity + ends[i, 2, k])
                 - T[i] * alpha[i, k]
                 - params[P.k_p + k] * x_e
                 - params[P.k_d + k] * v_e

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.errors import FlightDataError
+from colift.record.ends import ends_of
 from colift.record.importing.base import Array, Finding, Log, Reading
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -83,8 +84,8 @@ def doubt(label: str, log: Log, told: Reading) -> None:
         With the suspicion and the option that reads it.
 
     """
-    load, drones = (_placed(v) for v in (log.load[:, None, 0], log.drones["positions"]))
-    apart = load - drones
+    ends = ends_of(_placed(log.load[:, :1]), log.n)[:, :, 0]
+    apart = ends - _placed(log.drones["positions"])
     with np.errstate(over="ignore"):
         cables = np.linalg.norm(apart, axis=-1)
     usual = _median(cables)

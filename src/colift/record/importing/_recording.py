@@ -14,6 +14,7 @@ from pydantic import Field
 from colift.errors import FlightDataError
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.mission.schema import Drones, Load, RealFlight, Section, Start, Timing
+from colift.record.ends import ends_of
 from colift.record.importing._clocks import merge
 from colift.record.importing._plausible import LONGEST, clean, doubt
 from colift.record.importing.base import Array, Log, Reading, read
@@ -134,8 +135,9 @@ def _signals(log: Log) -> tuple[dict[str, Array], float | None]:
     arrays["load"] = log.load
     arrays["reference"][:, :2] = log.reference
     arrays |= {name: log.drones[name] for name in log.drones if name in arrays}
-    arrays["directions"], reach = _unit(log.load[:, None, 0] - log.drones["positions"])
-    turning = log.load[:, None, 1] - log.drones["velocities"]
+    ends = ends_of(log.load, log.n)
+    arrays["directions"], reach = _unit(ends[:, :, 0] - log.drones["positions"])
+    turning = ends[:, :, 1] - log.drones["velocities"]
     along = np.sum(turning * arrays["directions"], axis=-1, keepdims=True)
     arrays["direction_rates"] = (turning - along * arrays["directions"]) / reach[..., None]
     arrays["desired_directions"], arrays["desired_tensions"] = _unit(-log.drones["shares"])
@@ -158,7 +160,8 @@ def _unit(vectors: Array) -> tuple[Array, Array]:
 def _known(
     log: Log, arrays: dict[str, Array], assumed: Assumed, name: str, files: list[str]
 ) -> RealFlight:
-    reach = np.linalg.norm(log.load[:, None, 0] - log.drones["positions"], axis=-1)
+    ends = ends_of(log.load, log.n)
+    reach = np.linalg.norm(ends[:, :, 0] - log.drones["positions"], axis=-1)
     lengths = [round(float(length), 4) for length in np.nanmedian(reach, axis=0)]
     period = max(0.001, round(float(np.median(np.diff(log.time))), 3))
     given = assumed.cable_length

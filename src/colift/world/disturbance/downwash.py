@@ -78,7 +78,7 @@ def _depth_and_off(x, y, z, px, py, pz, ax, ay, az):  # type: ignore[no-untyped-
 
 @kernel(SIGNATURE)
 def _wash(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
-    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    load, ends, positions, velocities = sees.load, sees.ends, sees.positions, sees.velocities
     attitudes, directions, thrusts = sees.attitudes, sees.directions, sees.applied_thrusts
     attached = sees.attached
     wind, external = writes.wind, writes.external_forces
@@ -129,7 +129,7 @@ def _wash(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             cx, cy, cz = directions[i, 0], directions[i, 1], directions[i, 2]
             length = 0.0
             for k in range(3):
-                length += (load[0, k] - positions[i, k]) * directions[i, k]
+                length += (ends[i, 0, k] - positions[i, k]) * directions[i, k]
             for m in range(5):
                 s = _POINTS[m]
                 depth, off = _depth_and_off(
@@ -139,9 +139,9 @@ def _wash(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 v = speed_at(depth, off, induced, radius)
                 if v == 0.0:
                     continue
-                wx = wind[0] - (1.0 - s) * velocities[i, 0] - s * load[1, 0]
-                wy = wind[1] - (1.0 - s) * velocities[i, 1] - s * load[1, 1]
-                wz = wind[2] - (1.0 - s) * velocities[i, 2] - s * load[1, 2]
+                wx = wind[0] - (1.0 - s) * velocities[i, 0] - s * ends[i, 1, 0]
+                wy = wind[1] - (1.0 - s) * velocities[i, 1] - s * ends[i, 1, 1]
+                wz = wind[2] - (1.0 - s) * velocities[i, 2] - s * ends[i, 1, 2]
                 along_w = wx * cx + wy * cy + wz * cz
                 along_u = ux * cx + uy * cy + uz * cz
                 fx, fy, fz = _more_drag(

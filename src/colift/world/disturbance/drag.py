@@ -43,7 +43,7 @@ def _on_body(velocity, wind, quadratic, linear, force):  # type: ignore[no-untyp
 
 @kernel(SIGNATURE)
 def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
-    load, positions, velocities = sees.load, sees.positions, sees.velocities
+    load, ends, positions, velocities = sees.load, sees.ends, sees.positions, sees.velocities
     attitudes, directions, thrusts = sees.attitudes, sees.directions, sees.applied_thrusts
     attached = sees.attached
     wind, external = writes.wind, writes.external_forces
@@ -72,18 +72,18 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             continue
         length = 0.0
         for k in range(3):
-            length += (load[0, k] - positions[i, k]) * directions[i, k]
+            length += (ends[i, 0, k] - positions[i, k]) * directions[i, k]
         for m in range(3):
             s = _POINTS[m]
             along = squared = 0.0
             for k in range(3):
-                past = wind[k] - (1.0 - s) * velocities[i, k] - s * load[1, k]
+                past = wind[k] - (1.0 - s) * velocities[i, k] - s * ends[i, 1, k]
                 along += past * directions[i, k]
                 squared += past * past
             normal = math.sqrt(max(squared - along * along, 0.0))
             scale = _WEIGHTS[m] * half_rho * params[P.cable] * length * normal
             for k in range(3):
-                past = wind[k] - (1.0 - s) * velocities[i, k] - s * load[1, k]
+                past = wind[k] - (1.0 - s) * velocities[i, k] - s * ends[i, 1, k]
                 force = scale * (past - along * directions[i, k])
                 external[i, k] += (1.0 - s) * force
                 external[n, k] += s * force

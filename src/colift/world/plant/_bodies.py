@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
+from colift.kernel.load import ends_of
 from colift.kernel.math import quaternion
 from colift.part import Places, Vector
 from colift.team import Team
@@ -95,16 +96,18 @@ def normalise(n, y):  # type: ignore[no-untyped-def]
 
 
 @inline
-def line(y, o):  # type: ignore[no-untyped-def]
-    """Unit vector and distance to the load from the body whose state begins at ``o``.
-
-    Down where the two coincide, which is a direction too.
-    """
-    x, y_, z = y[0] - y[o], y[1] - y[o + 1], y[2] - y[o + 2]
-    d = math.sqrt(x * x + y_ * y_ + z * z)
+def unit(x, y, z):  # type: ignore[no-untyped-def]
+    """Unit vector and length; down for a vector without length, which is a direction too."""
+    d = math.sqrt(x * x + y * y + z * z)
     if d > 1e-12:
-        return x / d, y_ / d, z / d, d
+        return x / d, y / d, z / d, d
     return 0.0, 0.0, -1.0, d
+
+
+@inline
+def line(y, o):  # type: ignore[no-untyped-def]
+    """Unit vector and distance to the load from the body whose state begins at ``o``."""
+    return unit(y[0] - y[o], y[1] - y[o + 1], y[2] - y[o + 2])
 
 
 @inline
@@ -126,17 +129,21 @@ def catch_impulse(i, parting, params):  # type: ignore[no-untyped-def]
 
 @kernel(OBSERVE_SIGNATURE)
 def observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
-    load, positions, velocities = writes.load, writes.positions, writes.velocities
+    load, ends = writes.load, writes.ends
+    positions, velocities = writes.positions, writes.velocities
     attitudes, rates, directions = writes.attitudes, writes.rates, writes.directions
     direction_rates = writes.direction_rates
     y = memory
     for k in range(3):
         load[0, k] = y[k]
         load[1, k] = y[3 + k]
+    ends_of(load, ends)
     for i in range(positions.shape[0]):
         o = LOAD + DRONE * i
-        ax, ay, az, d = line(y, o)
-        vx, vy, vz = y[3] - y[o + 3], y[4] - y[o + 4], y[5] - y[o + 5]
+        ax, ay, az, d = unit(
+            ends[i, 0, 0] - y[o], ends[i, 0, 1] - y[o + 1], ends[i, 0, 2] - y[o + 2]
+        )
+        vx, vy, vz = ends[i, 1, 0] - y[o + 3], ends[i, 1, 1] - y[o + 4], ends[i, 1, 2] - y[o + 5]
         along = ax * vx + ay * vy + az * vz
         d = max(d, 1e-12)
         directions[i, 0], directions[i, 1], directions[i, 2] = ax, ay, az

@@ -22,7 +22,8 @@ from colift.team import Team
 OBSERVE_SIGNATURE = PORTS["plant_observe"].signature
 """Of ``observe(now, sees, params, memory, writes)``: writes the present state; sees nothing.
 
-The directions of a cut cable are those from its drone to the load, too.
+``ends`` are those of the cables on the load (:func:`colift.kernel.load.ends_of`). The directions of a cut cable are those from
+its drone to its end, too.
 """
 
 STEP_SIGNATURE = PORTS["plant"].signature
