@@ -152,7 +152,7 @@ def test_a_drone_far_off_is_pulled_back_no_harder_than_it_can_turn():
 
 
 def test_an_attitude_is_turned_by_its_torques_while_the_rate_is_not_measured():
-    ends = []
+    ends, ages = [], np.zeros((2, 3))
     for coast in (0.1, 0.0):
         part, team = DelayAware(delay=0.0, coast=coast), Team.uniform(1)
         memory, tau = part.memory(team), np.zeros((1, 3))
@@ -161,11 +161,12 @@ def test_an_attitude_is_turned_by_its_torques_while_the_rate_is_not_measured():
         for k in range(30):
             if k < 20:
                 seen = (angle, rate)
+            ages[0] = PERIOD * max(k - 19, 0)
             q = np.array([[np.cos(0.5 * seen[0]), np.sin(0.5 * seen[0]), 0.0, 0.0]])
             Omega = np.array([[seen[1], 0.0, 0.0]])
             part.call(
                 team, memory, dt=PERIOD, estimated_attitudes=q, estimated_rates=Omega,
-                desired_attitudes=UPRIGHT, torques=tau,
+                estimated_ages=ages, desired_attitudes=UPRIGHT, torques=tau,
             )  # fmt: skip
             torque = tau[0, 0] / team.inertias[0, 0]
             angle += PERIOD * (rate + 0.5 * PERIOD * torque)
@@ -185,9 +186,8 @@ def test_sampling_is_not_taken_for_silence():
         for k in range(200):
             angle = 0.1 * np.sin(0.02 * k)
             q = np.array([[np.cos(0.5 * angle), np.sin(0.5 * angle), 0.0, 0.0]])
-            Omega = np.array([[1e-9 * (k // held), 0.0, 0.0]])
             part.call(
-                team, memory, estimated_attitudes=q, estimated_rates=Omega,
+                team, memory, estimated_attitudes=q, estimated_ages=np.full((2, 3), 1e-3 * (k % held)),
                 desired_attitudes=UPRIGHT, torques=tau,
             )  # fmt: skip
         torques.append(tau[0, 0])
@@ -205,7 +205,7 @@ def test_a_silent_drone_is_carried_forward_and_then_left_standing():
         x = 1e-3 * (499 if silent else k)
         watched.look(
             k, load, np.array([[x, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]]), np.array([m * g]),
-            np.zeros(1), alpha,
+            np.zeros(1), alpha, age=1e-3 * (k - 499) if silent else 0.0,
         )  # fmt: skip
         seen.append(watched.out[1][0, 0])
     assert seen[560] == pytest.approx(0.560, abs=2e-3)  # at the speed it had
@@ -240,14 +240,14 @@ class Watched:
         self.memory = part.memory(self.team)
         self.out = [np.zeros((2, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 3))]  # fmt: skip
 
-    def look(self, k, load, positions, velocities, thrusts, tensions, directions):
+    def look(self, k, load, positions, velocities, thrusts, tensions, directions, age=0.0):
         names = ("load", "positions", "velocities", "attitudes", "rates")
         estimated = {f"estimated_{n}": out for n, out in zip(names, self.out, strict=True)}
         self.part.call(
             self.team, self.memory, step=k, measured_load=load, measured_positions=positions,
             measured_velocities=velocities, measured_attitudes=np.tile(UPRIGHT, (self.team.n, 1)),
-            thrusts=thrusts, received_tensions=tensions, received_directions=directions,
-            **estimated,
+            measured_ages=np.full((self.team.n + 1, 3), age), thrusts=thrusts,
+            received_tensions=tensions, received_directions=directions, **estimated,
         )  # fmt: skip
 
 
@@ -265,10 +265,12 @@ def test_what_thrust_and_tension_explain_is_predicted_exactly():
         return 0.5 * t * t * acceleration, t * acceleration, 0.5 * t * t * load_pull, t * load_pull
 
     for k in range(1500):
-        x, v, xl, vl = at(max(k - late, 0) // 5 * 5)
+        taken = max(k - late, 0) // 5 * 5
+        x, v, xl, vl = at(taken)
         watched.look(
-            k, np.array([xl, vl]), x[None], v[None], np.array([thrust]), np.array([tension]), alpha
-        )
+            k, np.array([xl, vl]), x[None], v[None], np.array([thrust]), np.array([tension]), alpha,
+            age=h * (k - taken),
+        )  # fmt: skip
     x, v, xl, vl = at(1499)
     np.testing.assert_allclose(watched.out[1][0], x, atol=2e-3)
     np.testing.assert_allclose(watched.out[2][0], v, atol=5e-3)

@@ -11,6 +11,7 @@ from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.team import Team
 from colift.world.link.radio import Radio
+from colift.world.sensing.ideal import Ideal
 from colift.world.sensing.noisy import Noisy
 
 QUIET = {
@@ -34,14 +35,14 @@ class Sensors:
         shapes = [(2, 3), (n, 3), (n, 3), (n, 4), (n, 3)]
         self.truth, self.measured = [np.zeros(s) for s in shapes], [np.zeros(s) for s in shapes]
         self.truth[3][:, 0] = 1.0
-        self.stuck = np.zeros(n + 1)
+        self.stuck, self.ages = np.zeros(n + 1), np.zeros((n + 1, 3))
 
     def read(self, step):
         truth = dict(zip(NAMES, self.truth, strict=True))
         measured = {f"measured_{n}": m for n, m in zip(NAMES, self.measured, strict=True)}
         self.part.call(
             self.team, self.memory, step=step, dt=self.dt, key=self.key, stuck=self.stuck, **truth,
-            **measured,
+            **measured, measured_ages=self.ages,
         )  # fmt: skip
         return dict(zip(NAMES, (m.copy() for m in self.measured), strict=True))
 
@@ -74,6 +75,29 @@ def test_delay_and_sampling_are_exact_in_steps():
     ):  # fmt: skip
         wanted = np.maximum((k - delay) // period * period, 0)
         np.testing.assert_allclose(found[name], wanted, atol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.0005])
+def test_a_sample_says_when_it_was_taken(dt):
+    """The truth counts seconds: less the age, whatever the sensor and whether it is stuck, that is what is measured."""
+    timing = {
+        "load_period": 0.004, "load_delay": 0.010, "tracking_period": 0.005, "tracking_delay": 0.003,
+        "attitude_period": 0.001, "attitude_delay": 0.002, "rates_period": 0.002, "rates_delay": 0.0,
+        "tracking_dropout": 0.3,
+    }  # fmt: skip
+    for part in (Noisy(**QUIET, **timing), Ideal()):
+        sensors = Sensors(part, dt=dt)
+        for k in range(200):
+            sensors.stuck[:] = [0.0, 60 <= k < 90, 130 <= k < 150]
+            for t in (0, 1, 2, 4):
+                sensors.truth[t][:] = k * dt
+            sensors.truth[3][:] = [np.cos(0.5 * k * dt), 0.0, 0.0, np.sin(0.5 * k * dt)]
+            now, ages = sensors.read(k), sensors.ages
+            turned = 2.0 * np.arctan2(now["attitudes"][:, 3], now["attitudes"][:, 0])
+            taken = np.column_stack([now["positions"][:, 0], turned, now["rates"][:, 0]])
+            np.testing.assert_allclose(k * dt - ages[:2], taken, rtol=0, atol=1e-12)
+            assert k * dt - ages[2, 0] == pytest.approx(now["load"][0, 0], abs=1e-12)
+        assert ages.any() == isinstance(part, Noisy)
 
 
 def test_noise_has_its_size_is_white_and_differs_between_axes():
@@ -195,9 +219,10 @@ class Link:
         self.part, self.n, self.key = part, n, key
         self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
         self.tensions, self.directions = np.zeros(n), np.zeros((n, 3))
+        self.ages = np.zeros(n)
 
     def count(self, steps):
-        """What each drone knows while the allocator counts the steps."""
+        """What each drone knows while the allocator counts the steps; its age says when it was sent."""
         rows = []
         for k in range(steps):
             wanted = np.full(self.n, float(k))
@@ -205,7 +230,9 @@ class Link:
                 self.team, self.memory, step=k, key=self.key, desired_tensions=wanted,
                 desired_directions=np.repeat(wanted, 3).reshape(-1, 3),
                 received_tensions=self.tensions, received_directions=self.directions,
+                received_ages=self.ages,
             )  # fmt: skip
+            np.testing.assert_allclose(k - 1e3 * self.ages, self.tensions, rtol=0, atol=1e-6)
             assert_array_equal(self.directions[:, 2], self.tensions)
             rows.append(self.tensions.copy())
         return np.array(rows)

@@ -203,13 +203,13 @@ def _named(prefix: str) -> tuple[str, ...]:
     return tuple(f"{prefix}_{name}" for name in _TRUE.split())
 
 
-_RECEIVED = ("received_tensions", "received_directions")
+_RECEIVED = ("received_tensions", "received_directions", "received_ages")
 
 PORTS: dict[str, Port] = {
     port.name: port
     for port in (
         Port("sensing", sees=(*_TRUE.split(), "stuck")),
-        Port("estimation", sees=(*_named("measured"), "thrusts", *_RECEIVED)),
+        Port("estimation", sees=(*_named("measured"), "measured_ages", "thrusts", *_RECEIVED)),
         Port("supervision", sees=(*_named("estimated"), "thrusts", *_RECEIVED)),
         Port("reference", sees=()),
         Port("load_control", sees=("estimated_load", "reference")),
@@ -221,12 +221,18 @@ PORTS: dict[str, Port] = {
         ),
         Port(
             "attitude_control",
-            sees=("estimated_attitudes", "estimated_rates", "desired_attitudes", "desired_rates"),
+            sees=(
+                "estimated_attitudes", "estimated_rates", "estimated_ages", "desired_attitudes",
+                "desired_rates",
+            ),
         ),
         Port("actuation", sees=("thrusts", "torques", "motor_health")),
         Port(
             "detection",
-            sees=("estimated_ends", *_named("estimated")[1:4], "thrusts", *_RECEIVED),
+            sees=(
+                "estimated_ends", *_named("estimated")[1:4], "estimated_ages", "thrusts",
+                *_RECEIVED,
+            ),
         ),
         Port("plant_observe", sees=()),
         Port("plant", sees=("applied_thrusts", "applied_torques", "external_forces", "attached")),

@@ -14,6 +14,7 @@ from colift.control.tuning import Delays
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
+from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
 from colift.team import Team
@@ -28,8 +29,8 @@ PARAMS = Layout(
     drone={"J": 3, "K_d": 3},
 )
 """``most``: angular acceleration; ``coast``: how long silence is made up for, from ``steady`` on."""
-MEMORY = Layout(drone={"past": 3 * _MOST, "acting": 3, "last": 3, "silence": 1})
-"""``past``: torques, newest first; ``acting``: the torque that acts; ``last``: rate that was measured."""
+MEMORY = Layout(drone={"past": 3 * _MOST, "acting": 3, "age": 1, "silence": 1})
+"""``past``: torques, newest first; ``acting``: the torque that acts; ``age`` of the newest rate, ``silence`` since it came."""
 P, M = PARAMS.at, MEMORY.at
 
 
@@ -60,11 +61,10 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
     for i in range(n):
         c, o = P.rows + P.width * i, M.rows + M.width * i
         act, was = o + M.acting, o + M.past
-        silent = True
-        for k in range(3):
-            silent = silent and Omega[i, k] == memory[o + M.last + k]
-            memory[o + M.last + k] = Omega[i, k]
-        memory[o + M.silence] = memory[o + M.silence] + dt if silent else 0.0
+        age = sees.estimated_ages[i, 2]
+        new = newer(memory, o + M.age, age, dt)
+        memory[o + M.age] = age
+        memory[o + M.silence] = 0.0 if new else memory[o + M.silence] + dt
         silence = min(max(memory[o + M.silence] - params[P.steady], 0.0), params[P.coast])
         # Whole periods of the age of what is measured, and what is left over of one more.
         span = params[P.delay] + silence
@@ -113,7 +113,7 @@ class DelayAware(AttitudeControlPart, Delays):
     attitude it turns no faster than it can stop. With ``predicted``, attitude and rate are carried
     forward over ``delay`` by Euler's equations and the torques that acted meanwhile (a Smith predictor in
     state space; Manitius and Olbrot 1979, "finite spectrum assignment"), and the motors' lag is inverted.
-    If the measured rate does not change for longer than ``steady``, it is taken to be that much older, up to
+    If there is no new rate for longer than ``steady``, the last one is that much older, which is made up for up to
     ``coast``.
     """
 

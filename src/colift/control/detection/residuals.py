@@ -1,4 +1,4 @@
-"""Lost drones from residuals: a cable that lengthens, a thrust that is not there, numbers that stand still."""
+"""Lost drones from residuals: a cable that lengthens, a thrust that is not there, sensors without news."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from colift.control.detection.base import SIGNATURE, DetectionPart
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
+from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
 from colift.part import Vector
 from colift.team import Team
@@ -25,12 +26,12 @@ PARAMS = Layout(
 MEMORY = Layout(
     drone={
         "started": 1, "length": 1, "distance": 1, "speed": 1, "velocity": 3, "expected": 3,
-        "cable": 1, "thrust": 1, "still": 1, "last": 10, "now": 1, "steady": 1, "lack": 3,
+        "cable": 1, "thrust": 1, "still": 1, "ages": 2, "now": 1, "steady": 1, "lack": 3,
         "counts": 1,
     }
 )  # fmt: skip
 """Filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
-``thrust`` last; time without any change (``still``) of position, velocity and attitude (``last``); whether the distance
+``thrust`` last; time without anything new (``still``) of tracking and attitude, and their ``ages``; whether the distance
 changes faster than that of a taut cable (``now``), and time in which it did not (``steady``); the acceleration that lacks
 (``lack``), and whether it ``counts`` as wind for the others."""
 P, M = PARAMS.at, MEMORY.at
@@ -117,15 +118,11 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         memory[o + M.cable] = memory[o + M.cable] + dt if apart else 0.0
 
         still = True
-        for k in range(10):
-            if k < 3:
-                value = positions[i, k]
-            elif k < 6:
-                value = velocities[i, k - 3]
-            else:
-                value = attitudes[i, k - 6]
-            still = still and value == memory[o + M.last + k]
-            memory[o + M.last + k] = value
+        for k in range(2):
+            age = sees.estimated_ages[i, k]
+            if newer(memory, o + M.ages + k, age, dt):
+                still = False
+            memory[o + M.ages + k] = age
         memory[o + M.still] = memory[o + M.still] + dt if still else 0.0
         went = math.sqrt(went) * memory[o + M.still]
 
@@ -173,9 +170,8 @@ class Residuals(DetectionPart):
     lacks upwards. A cable that pulls more than it should looks the same, but only while it is taut: a drone that falls
     slackens its cable. One that does not is given up only after ``tug``, unless it is alone.
 
-    Third: a drone of which no number changes is not measured any more when its own speed says that it went on for
-    ``astray`` meanwhile, or, where asked for, after a while (``frozen``): noise never repeats itself, but perfect
-    sensors of a drone in balance may.
+    Third: a drone of whose place and attitude nothing new comes is not measured any more when its own speed says that it
+    went on for ``astray`` meanwhile, or, where asked for, after a while (``frozen``).
     """
 
     kernel = _judge
@@ -194,9 +190,9 @@ class Residuals(DetectionPart):
     deficit: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.45
     """Share of the commanded thrust that lacks."""
     frozen: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
-    """Time for which nothing that is known of a drone changes, s; 0: not looked at."""
+    """Time for which nothing new of a drone comes, s; 0: not looked at."""
     astray: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
-    """Distance that a drone would have gone at its speed while nothing that is known of it changes, m; 0: not looked at."""
+    """Distance that a drone would have gone at its speed while nothing new of it comes, m; 0: not looked at."""
     tug: Annotated[float, Field(ge=0.0, le=10.0)] = 0.2
     """Time for which thrust must lack on a cable that stays taut, s."""
 

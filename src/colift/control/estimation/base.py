@@ -10,7 +10,8 @@ from colift.part import Part
 SIGNATURE = PORTS["estimation"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-Called each physics step. A sensor that has nothing new repeats its last value; ``thrusts`` are the last commands.
+Called each physics step. A sensor that has nothing new repeats its last value, which grows older (``measured_ages``); ``thrusts`` are
+the last commands. ``estimated_ages`` are those of what is estimated, in the same columns: tracking, attitude, rates.
 """
 
 

@@ -14,6 +14,7 @@ def _believe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     estimated_load, estimated_positions = writes.estimated_load, writes.estimated_positions
     estimated_velocities = writes.estimated_velocities
     estimated_attitudes, estimated_rates = writes.estimated_attitudes, writes.estimated_rates
+    measured_ages, estimated_ages = sees.measured_ages, writes.estimated_ages
     for k in range(2):
         for m in range(3):
             estimated_load[k, m] = load[k, m]
@@ -24,6 +25,9 @@ def _believe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             estimated_rates[i, m] = rates[i, m]
         for m in range(4):
             estimated_attitudes[i, m] = attitudes[i, m]
+    for i in range(measured_ages.shape[0]):
+        for m in range(3):
+            estimated_ages[i, m] = measured_ages[i, m]
 
 
 class Unfiltered(EstimationPart):

@@ -16,6 +16,7 @@ from colift.control.tuning import lag_warnings, shorter
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
+from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
 from colift.team import Team
@@ -35,12 +36,13 @@ PARAMS = Layout(
 """``turn``: age of the attitudes; ``room``: accelerations that a body's ring has room for."""
 BODY = Layout(
     team={
-        "started": 1, "age": 1, "sample": 6, "state": 9, "attitude": 4, "seen": 4, "since": 1,
-        "thrust": 1, "ring": None,
+        "started": 1, "waited": 1, "age": 1, "sample": 6, "state": 9, "attitude": 4,
+        "attitude_age": 1, "since": 1, "thrust": 1, "ring": None,
     }
 )  # fmt: skip
-"""``age`` of the last ``sample``; ``state`` when it was taken: position, velocity, unexplained acceleration; the attitude
-``seen`` last, and time ``since`` then; ``thrust`` that acts; ``ring`` of known accelerations."""
+"""Time ``waited`` since the last ``sample`` came, and its ``age``; ``state`` when it was taken: position, velocity, unexplained
+acceleration; age of the last measured attitude, and time ``since`` it came; ``thrust`` that acts; ``ring`` of known
+accelerations."""
 MEMORY = Layout(team={"load": None}, drone={"body": None})
 P, F, B = PARAMS.at, FILTER.at, BODY.at
 
@@ -89,17 +91,15 @@ def _forecast(o, slot, places, dt, memory, k):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _sampled(o, row, period, dt, memory, position, velocity):  # type: ignore[no-untyped-def]
+def _sampled(o, row, age, period, dt, memory, position, velocity):  # type: ignore[no-untyped-def]
     """Whether there is something new from the sensor; if so it becomes the sample."""
-    memory[o + B.age] += dt
-    fresh = False
-    for k in range(3):
-        fresh = fresh or position[row, k] != memory[o + B.sample + k]
-    if fresh and memory[o + B.age] > period - 0.5 * dt:
+    memory[o + B.waited] += dt
+    if newer(memory, o + B.age, age, dt) and memory[o + B.waited] > period - 0.5 * dt:
         for k in range(3):
             memory[o + B.sample + k] = position[row, k]
             memory[o + B.sample + 3 + k] = velocity[row, k]
-        memory[o + B.age] = 0.0
+        memory[o + B.age] = age
+        memory[o + B.waited] = 0.0
         return True
     return False
 
@@ -115,8 +115,8 @@ def _start(o, row, position, velocity, memory):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-untyped-def]
-    """Integrate the measured rate; of a new attitude believe a share of the turn that leads to it."""
+def _attitude(o, i, age, dt, attitudes, rates, params, memory):  # type: ignore[no-untyped-def]
+    """Integrate the measured rate; of a new attitude believe a share of the turn that leads to it. The age of what comes of it."""
     a = o + B.attitude
     memory[o + B.since] += dt
     # A rate without attitudes beside it has stopped being measured as well.
@@ -125,11 +125,8 @@ def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-un
         memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
         rates[i, 0] * step, rates[i, 1] * step, rates[i, 2] * step,
     )  # fmt: skip
-    fresh = False
-    for k in range(4):
-        fresh = fresh or attitudes[i, k] != memory[o + B.seen + k]
-        memory[o + B.seen + k] = attitudes[i, k]
-    if fresh:
+    if newer(memory, o + B.attitude_age, age, dt):
+        memory[o + B.attitude_age] = age
         ew, ex, ey, ez = quaternion.multiply(
             w, -x, -y, -z, attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
         )
@@ -143,6 +140,7 @@ def _attitude(o, i, dt, attitudes, rates, params, memory):  # type: ignore[no-un
     memory[a + 1] = x * scale
     memory[a + 2] = y * scale
     memory[a + 3] = z * scale
+    return age - min(memory[o + B.since], params[P.steady])
 
 
 @kernel(SIGNATURE)
@@ -155,6 +153,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     estimated_load, estimated_positions = writes.estimated_load, writes.estimated_positions
     estimated_velocities = writes.estimated_velocities
     estimated_attitudes, estimated_rates = writes.estimated_attitudes, writes.estimated_rates
+    measured_ages, ages = sees.measured_ages, writes.estimated_ages
     n = positions.shape[0]
     # Steps finer than the ring are taken several at once.
     room = int(params[P.room])
@@ -162,6 +161,9 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     steps = round(params[P.delay] / dt)
     stride = max((steps + room - 1) // room, 1)
     if step % stride != 0:
+        for i in range(n + 1):
+            for k in range(3):
+                ages[i, k] += dt
         return
     places = round(steps / stride)
     slot = (step // stride) % max(places, 1)
@@ -174,16 +176,21 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         m = params[P.rows + P.width * i + P.m]
         if memory[o + B.started] == 0.0:
             memory[o + B.thrust] = thrusts[i]
+            memory[o + B.age] = measured_ages[i, 0] - dt
+            memory[o + B.attitude_age] = measured_ages[i, 1] - dt
             for k in range(4):
-                memory[o + B.attitude + k] = memory[o + B.seen + k] = attitudes[i, k]
+                memory[o + B.attitude + k] = attitudes[i, k]
         _start(o, i, positions, velocities, memory)
         memory[o + B.thrust] = keep * memory[o + B.thrust] + (1.0 - keep) * thrusts[i]
-        coasting = memory[o + B.age] <= params[P.coast]
-        fresh = _sampled(o, i, params[P.period], dt, memory, positions, velocities)
+        coasting = memory[o + B.waited] <= params[P.coast]
+        fresh = _sampled(
+            o, i, measured_ages[i, 0], params[P.period], dt, memory, positions, velocities
+        )
         if fresh and not coasting:
             memory[o + B.started] = 0.0
             _start(o, i, positions, velocities, memory)
-        _attitude(o, i, dt, attitudes, rates, params, memory)
+        ages[i, 1] = _attitude(o, i, measured_ages[i, 1], dt, attitudes, rates, params, memory)
+        ages[i, 2] = measured_ages[i, 2]
         turn, a = params[P.turn], o + B.attitude
         qw, qx, qy, qz = quaternion.turn(
             memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
@@ -201,26 +208,33 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         for k in range(3):
             estimated_rates[i, k] = rates[i, k]
         if not (fresh or coasting):
+            ages[i, 0] += dt
             continue
+        ages[i, 0] = 0.0
         for k in range(3):
             p, v = _forecast(o, slot, places, dt, memory, k)
             estimated_positions[i, k] = p
             estimated_velocities[i, k] = v
+    if memory[B.started] == 0.0:
+        memory[B.age] = measured_ages[n, 0] - dt
     _start(0, 0, load[0:1], load[1:2], memory)
     _advance(0, slot, places, dt, -px / m_L, -py / m_L, -pz / m_L - g, memory)
-    tracked = _sampled(0, 0, params[P.period], dt, memory, load[0:1], load[1:2])
+    tracked = _sampled(
+        0, 0, measured_ages[n, 0], params[P.period], dt, memory, load[0:1], load[1:2]
+    )
     s = B.state
-    if not tracked and memory[B.age] > params[P.patience] + params[P.period]:
+    if not tracked and memory[B.waited] > params[P.patience] + params[P.period]:
         guess = (
             memory[s], memory[s + 1], memory[s + 2], memory[s + 3], memory[s + 4], memory[s + 5]
         )  # fmt: skip
         found = load_from_drones(n, width + s, width, memory, P.rows + P.L, P.width, params, guess)
         for k in range(6):
             memory[B.sample + k] = found[k]
-        memory[B.age] = params[P.patience]
+        memory[B.waited] = params[P.patience]
         tracked = True
     if tracked:
         _correct(0, P.load, params, memory)
+    ages[n, 0] = 0.0
     for k in range(3):
         p, v = _forecast(0, slot, places, dt, memory, k)
         estimated_load[0, k] = p

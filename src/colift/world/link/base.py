@@ -10,7 +10,7 @@ from colift.part import Part
 SIGNATURE = PORTS["link"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-Called each physics step.
+Called each physics step. ``received_ages`` are times since what was received was sent.
 """
 
 

@@ -21,7 +21,8 @@ PARAMS = Layout(
     team={"period": 1, "delay": 1, "jitter": 1, "slots": 1, "row": 1}, drone={"loss": 1}
 )
 """``slots``: packets that may be on their way to a drone; ``row``: length of a drone's row in memory."""
-PACKET = Layout(team={"tension": 1, "direction": 3})
+PACKET = Layout(team={"sent": 1, "tension": 1, "direction": 3})
+"""``sent``: at which step."""
 MEMORY = Layout(drone={"started": 1, "packets": None})
 P, K, M = PARAMS.at, PACKET.at, MEMORY.at
 _WIDTH = PACKET.size(0)
@@ -32,6 +33,7 @@ def _transmit(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     step, key, dt = now.step, now.key, now.dt
     tensions, directions = sees.desired_tensions, sees.desired_directions
     received_tensions, received_directions = writes.received_tensions, writes.received_directions
+    ages = writes.received_ages
     slots, row = int(params[P.slots]), int(params[P.row])
     every = max(1, int(params[P.period] / dt + 0.5))
     due, number = step % every == 0, step // every
@@ -48,11 +50,14 @@ def _transmit(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
                 delay = params[P.delay] + params[P.jitter] * late
                 at = fifo.post(memory, queue, slots, _WIDTH, step + int(delay / dt + 0.5))
         if at >= 0:
+            memory[at + K.sent] = step
             memory[at + K.tension] = tensions[i]
             for k in range(3):
                 memory[at + K.direction + k] = directions[i, k]
         at = fifo.fetch(memory, queue, slots, _WIDTH, step)
+        ages[i] += dt
         if at >= 0:
+            ages[i] = (step - memory[at + K.sent]) * dt
             received_tensions[i] = memory[at + K.tension]
             for k in range(3):
                 received_directions[i, k] = memory[at + K.direction + k]

@@ -10,12 +10,17 @@ from colift.part import Part
 SIGNATURE = PORTS["sensing"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
-Called each physics step.
+Called each physics step. ``measured_ages`` are times since the samples were taken, in columns as in :data:`AGES`; a sensor that
+has nothing new repeats its last value, which grows older.
 """
 
 
 SENSORS = ("load", "tracking", "attitude", "rates")
 """What is measured: the load, and of each drone its position and velocity, its attitude, its body rates."""
+
+
+AGES = ("tracking", "attitude", "rates")
+"""Columns of ``measured_ages``; of a load that is a point only the first has a sensor."""
 
 
 class SensingPart(Part):

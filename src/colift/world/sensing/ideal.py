@@ -12,7 +12,7 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     attitudes, rates, stuck = sees.attitudes, sees.rates, sees.stuck
     measured_load, measured_positions = writes.measured_load, writes.measured_positions
     measured_velocities, measured_attitudes = writes.measured_velocities, writes.measured_attitudes
-    measured_rates = writes.measured_rates
+    measured_rates, ages = writes.measured_rates, writes.measured_ages
     n = positions.shape[0]
     if stuck[n] == 0.0:
         for k in range(2):
@@ -26,6 +26,9 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 measured_rates[i, m] = rates[i, m]
             for m in range(4):
                 measured_attitudes[i, m] = attitudes[i, m]
+    for i in range(n + 1):
+        for m in range(3):
+            ages[i, m] = 0.0 if stuck[i] == 0.0 else ages[i, m] + now.dt
 
 
 class Ideal(SensingPart):

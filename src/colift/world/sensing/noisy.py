@@ -22,7 +22,12 @@ Delay = Annotated[float, Field(ge=0.0, le=2.0)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Period = Annotated[float, Field(ge=1e-5, le=1.0)]
 
-_WIDTHS = {"load": 6, "tracking": 6, "attitude": 4, "rates": 3}  # numbers in one sample
+_WIDTHS = {
+    "load": 6,
+    "tracking": 6,
+    "attitude": 4,
+    "rates": 3,
+}  # numbers in one sample, before its step
 _QUANTITIES = ("load_position", "load_velocity", "position", "velocity", "attitude", "rates")
 _CHANNELS = 16  # of random numbers per body: 0-6 the noise, two axes in each; 7-10 dropouts
 _TURNING, _SPINNING = 3, 5  # the first of attitude and rates; tracking has 0-2
@@ -56,27 +61,31 @@ def _place(fresh, step, dt, key, lost, params, sensor, memory, o, width):  # typ
     """Place and number of a sensor's sample; the place is -1 if none is taken at this step or it is lost.
 
     ``o`` is where the body's memory begins, ``lost`` the channel that decides on losses. The first sample of all arrives
-    at once: bodies were at rest before. Its number is below -1, that of the bias.
+    at once: bodies were at rest before. Its number is below -1, that of the bias. Behind its ``width`` numbers a sample
+    has the step at which it is taken.
     """
     queue, slots = o + int(params[sensor + S.samples]), int(params[sensor + S.slots])
     every = max(1, int(params[sensor + S.period] / dt + 0.5))
-    number = step // every
+    number, due = step // every, step
     if fresh:
-        return fifo.post(memory, queue, slots, width, step), -2 - number
-    if step % every != 0:
-        return -1, number
-    dropout = params[sensor + S.dropout]
-    if dropout > 0.0 and noise.uniform(key, number, lost) < dropout:
-        return -1, number
-    due = step + int(params[sensor + S.delay] / dt + 0.5)
-    return fifo.post(memory, queue, slots, width, due), number
+        number = -2 - number
+    else:
+        if step % every != 0:
+            return -1, number
+        dropout = params[sensor + S.dropout]
+        if dropout > 0.0 and noise.uniform(key, number, lost) < dropout:
+            return -1, number
+        due = step + int(params[sensor + S.delay] / dt + 0.5)
+    at = fifo.post(memory, queue, slots, width + 1, due)
+    memory[at + width] = step
+    return at, number
 
 
 @inline
 def _arrived(step, params, sensor, memory, o, width):  # type: ignore[no-untyped-def]
     """Place of the newest of a sensor's samples that has arrived, or -1."""
     queue, slots = o + int(params[sensor + S.samples]), int(params[sensor + S.slots])
-    return fifo.fetch(memory, queue, slots, width, step)
+    return fifo.fetch(memory, queue, slots, width + 1, step)
 
 
 @inline
@@ -105,7 +114,7 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     attitudes, rates, stuck = sees.attitudes, sees.rates, sees.stuck
     measured_load, measured_positions = writes.measured_load, writes.measured_positions
     measured_velocities, measured_attitudes = writes.measured_velocities, writes.measured_attitudes
-    measured_rates = writes.measured_rates
+    measured_rates, ages = writes.measured_rates, writes.measured_ages
     n = positions.shape[0]
     # The load's noise is that of body 0, a drone's that of body i + 1.
     fresh = memory[M.load_started] == 0.0
@@ -123,6 +132,9 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         for k in range(3):
             measured_load[0, k] = memory[at + k]
             measured_load[1, k] = memory[at + 3 + k]
+        ages[n, 0] = (step - memory[at + 6]) * dt
+    else:
+        ages[n, 0] += dt
 
     first, row = int(params[P.first_row]), int(params[P.row])
     for i in range(n):
@@ -145,6 +157,9 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             for k in range(3):
                 measured_positions[i, k] = memory[at + k]
                 measured_velocities[i, k] = memory[at + 3 + k]
+            ages[i, 0] = (step - memory[at + 6]) * dt
+        else:
+            ages[i, 0] += dt
 
         sensor, lost = P.attitude_sensor, channel + _ATTITUDE_LOST
         at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 4)
@@ -167,6 +182,9 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if at >= 0 and stuck[i] == 0.0:
             for k in range(4):
                 measured_attitudes[i, k] = memory[at + k]
+            ages[i, 1] = (step - memory[at + 4]) * dt
+        else:
+            ages[i, 1] += dt
 
         sensor, lost = P.rates_sensor, channel + _RATES_LOST
         at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 3)
@@ -180,6 +198,9 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if at >= 0 and stuck[i] == 0.0:
             for k in range(3):
                 measured_rates[i, k] = memory[at + k]
+            ages[i, 2] = (step - memory[at + 3]) * dt
+        else:
+            ages[i, 2] += dt
 
 
 class Noisy(SensingPart):
@@ -275,7 +296,7 @@ class Noisy(SensingPart):
         return PARAMS.pack(team.n, first_row=where.rows, row=where.width, **packed)
 
     def layout(self) -> Layout:
-        queues = {name: fifo.size(self._slots(name), width) for name, width in _WIDTHS.items()}
+        queues = {name: fifo.size(self._slots(name), width + 1) for name, width in _WIDTHS.items()}
         return MEMORY.filled(**{f"{name}_samples": int(size) for name, size in queues.items()})
 
     def delays(self) -> dict[str, float]:
