@@ -35,7 +35,16 @@ KIND = ("kind",)
 """Key beside a part's settings in a mission's section."""
 
 
-class Setup(Protocol):
+class Declared(Protocol):
+    """What a mission says to all parts, before there are any."""
+
+    @property
+    def timing(self) -> Any:
+        """Duration, physics step and periods, s, and the declared delay."""
+        ...
+
+
+class Setup(Declared, Protocol):
     """What a part may look at of the mission that it flies in, to warn before the flight."""
 
     @property
@@ -51,11 +60,6 @@ class Setup(Protocol):
     @property
     def true_team(self) -> Team:
         """The bodies as they are."""
-        ...
-
-    @property
-    def timing(self) -> Any:
-        """Duration, physics step and periods, s."""
         ...
 
     @property
@@ -105,12 +109,20 @@ class Part(BaseModel, metaclass=Refusing):
     """Names of the places in the kernel's memory; sizes that depend on the settings are filled in by :meth:`layout`."""
     per_drone: ClassVar[tuple[str, ...]] = ()
     """Settings that may be a list with one value per drone."""
+    delays_declared: ClassVar[tuple[str, ...]] = ()
+    """Settings that are the mission's ``timing.delay``, where it has one and does not give them themselves."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
             raise SettingError(problems_of(error, type(self), {name: value})) from error
+
+    @classmethod
+    def declared(cls, mission: Declared) -> dict[str, Any]:
+        """Defaults that the mission declares in one place, by the name of the setting; they go before the part's own."""
+        delay = mission.timing.delay
+        return {} if delay is None else dict.fromkeys(cls.delays_declared, delay)
 
     def of(self, drones: Sequence[int]) -> Self:
         """Settings for the team of these drones: of values per drone, theirs."""
@@ -306,8 +318,8 @@ def find(layer: str, kind: str) -> type[Part]:
     return part
 
 
-def make(layer: str, table: Mapping[str, Any]) -> Part:
-    """The part that a mission's section describes: its ``kind`` and its settings.
+def make(layer: str, table: Mapping[str, Any], mission: Declared | None = None) -> Part:
+    """The part that a mission's section describes: its ``kind`` and its settings, beside what the mission declares.
 
     Raises
     ------
@@ -319,8 +331,9 @@ def make(layer: str, table: Mapping[str, Any]) -> Part:
     """
     settings = dict(table)
     part = find(layer, str(settings.pop("kind", "")))
+    known = {} if mission is None else part.declared(mission)
     try:
-        return part(**settings)
+        return part(**{**known, **settings})
     except SettingError as error:
         raise error.within(layer) from error
 

@@ -37,7 +37,7 @@ class Delays(BaseModel):
     """What stands between a motion and the answer to it; the settings that delay-aware parts share."""
 
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
-    """Age of the measurements, s."""
+    """Age of the measurements, s; ``timing.delay`` where the mission has one."""
     period: Annotated[float, Field(gt=0.0, le=0.5)] = 0.01
     """Control period, s."""
     lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0

@@ -170,9 +170,9 @@ class Flight:
                 self._true_team(leg.drones)
             )
         elif path == "allocation.kind":
-            self.replace("allocation", make("allocation", {"kind": value}))
+            self.replace("allocation", make("allocation", {"kind": value}, self.mission))
         elif path in self.parts:
-            self.replace(path, make(path.partition(".")[0], value))
+            self.replace(path, make(path.partition(".")[0], value, self.mission))
         elif section in self.parts:
             self.replace(section, _with(self.parts[section], section, name, value))
         else:

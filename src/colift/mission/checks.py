@@ -195,9 +195,10 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
                         f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
                     )
         elif event.field in present:
-            yield from _section_change(f"events.{i}", event.field, event.value, present)
+            yield from _section_change(f"events.{i}", event.field, event.value, present, frame)
         elif event.field == "allocation.kind":
-            yield from _section_change(f"events.{i}", section, {"kind": event.value}, present)
+            table = {"kind": event.value}
+            yield from _section_change(f"events.{i}", section, table, present, frame)
         elif name == "kind":
             message = f"to put another part in place give the whole section {section}"
             yield Problem(f"events.{i}.field", event.field, message)
@@ -208,7 +209,7 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
 
 
 def _section_change(
-    path: str, section: str, table: Any, present: dict[str, Part]
+    path: str, section: str, table: Any, present: dict[str, Part], frame: Frame
 ) -> Iterable[Problem]:
     """Mistakes of a part that takes the place of another, which is brought up to date."""
     if not isinstance(table, dict) or "kind" not in table:
@@ -225,7 +226,7 @@ def _section_change(
         yield Problem(f"{path}.value", shown(table["kind"]), message)
         return
     try:
-        present[section] = parse(part, settings)
+        present[section] = parse(part, {**part.declared(frame), **settings})
     except ValidationError as error:
         for problem in problems_of(error, part, settings, section, KIND):
             yield Problem(path, problem.value, f"{problem.path} {problem.message}")

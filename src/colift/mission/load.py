@@ -37,7 +37,7 @@ def load_mission(
         Values by dotted path, such as ``{"allocation.mu": 0.75}`` or, for a whole section,
         ``{"allocation": {"kind": "sqp"}}``. They replace those of the source one after the other, so that
         the later one wins; another ``kind`` drops the settings of the part that stood there before, but none
-        that was given by its own path.
+        that was given by its own path. Another ``timing.delay`` takes those settings along that were the same as the one before.
     must_fly
         Whether a mission whose team cannot hold its load, or keep its limits, is refused as well.
 
@@ -58,10 +58,13 @@ def load_mission(
         raise SettingError.of("mission", shown(source), "must be a name, a path or a mapping")
     problems: list[Problem] = []
     given: set[str] = set()
+    delay = _declared_delay(table)
     for path, value in _plain(overrides or {}).items():
         problem = _override(table, path, value, given)
         if problem:
             problems.append(problem)
+    if "timing.delay" in given or "timing" in given:
+        _follow_delay(table, delay, given)
     mission = _validate(table, problems, must_fly)
     if problems or mission is None:
         raise MissionError(label, problems)
@@ -128,6 +131,26 @@ def _override(table: dict[str, Any], path: str, value: Any, given: set[str]) -> 
     return None
 
 
+def _declared_delay(table: Mapping[str, Any]) -> Any:
+    timing = table.get("timing")
+    return timing.get("delay") if isinstance(timing, dict) else None
+
+
+def _follow_delay(table: dict[str, Any], before: Any, given: set[str]) -> None:
+    """Take away settings that the delay declared ``before`` filled in, so that the new one does."""
+    for layer in LAYERS:
+        section = table.get(layer)
+        if before is None or not isinstance(section, dict) or layer in given:
+            continue
+        try:
+            part = find(layer, str(section.get("kind", DEFAULT_KINDS.get(layer))))
+        except UnknownNameError:
+            continue
+        for name in part.delays_declared:
+            if section.get(name) == before and f"{layer}.{name}" not in given:
+                del section[name]
+
+
 def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
     """A copy as tables, lists, numbers, texts and booleans, which is what a mission file can hold."""
     try:
@@ -145,30 +168,27 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
     """Validate section by section, so that a mistake in one does not hide those in others."""
     parts: dict[str, Part] = {}
     kinds: dict[str, str] = {}
-    rest = dict(table)
+    rest = {name: section for name, section in table.items() if name not in (*LAYERS, *LISTS)}
+    frame, mistakes = _frame(rest)
     for layer in LAYERS:
-        found = _part(layer, rest.pop(layer, {}), layer, problems)
+        found = _part(layer, table.get(layer, {}), layer, frame, problems)
         if found is not None:
             kinds[layer], parts[layer] = found
     lists: dict[str, list[Part]] = {}
     list_kinds: dict[str, list[str]] = {}
     for name in LISTS:
-        sections = rest.pop(name, [])
+        sections = table.get(name, [])
         if not isinstance(sections, list):
             problems.append(Problem(name, shown(sections), f"must be a list of tables, [[{name}]]"))
             sections = []
-        each = [_part(name, section, f"{name}.{i}", problems) for i, section in enumerate(sections)]
+        each = [
+            _part(name, section, f"{name}.{i}", frame, problems)
+            for i, section in enumerate(sections)
+        ]
         list_kinds[name] = [item[0] for item in each if item]
         lists[name] = [item[1] for item in each if item]
-    broken: set[str] = set()
-    try:
-        frame = parse(Frame, rest)
-    except ValidationError as error:
-        mistakes = problems_of(error, Frame, rest, further=FOLDERS)
-        problems.extend(mistakes)
-        broken = {problem.path.partition(".")[0] for problem in mistakes}
-        intact = {key: value for key, value in rest.items() if key not in broken}
-        frame = parse(Frame, {"name": "?", **intact})
+    problems.extend(mistakes)
+    broken = {problem.path.partition(".")[0] for problem in mistakes}
     problems.extend(cross_checks(frame, parts, lists, broken, must_fly=must_fly))
     if must_fly and not problems:
         problems.extend(hover_checks(frame, parts))
@@ -179,7 +199,20 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
     )
 
 
-def _part(layer: str, section: Any, path: str, problems: list[Problem]) -> tuple[str, Part] | None:
+def _frame(table: dict[str, Any]) -> tuple[Frame, list[Problem]]:
+    """All but the layers, with defaults for sections that hold mistakes, and these."""
+    try:
+        return parse(Frame, table), []
+    except ValidationError as error:
+        mistakes = problems_of(error, Frame, table, further=FOLDERS)
+        broken = {problem.path.partition(".")[0] for problem in mistakes}
+        intact = {key: value for key, value in table.items() if key not in broken}
+        return parse(Frame, {"name": "?", **intact}), mistakes
+
+
+def _part(
+    layer: str, section: Any, path: str, frame: Frame, problems: list[Problem]
+) -> tuple[str, Part] | None:
     """Name and settings of the part that a section asks for; None, and problems, where it cannot."""
     if not isinstance(section, dict):
         problems.append(Problem(path, shown(section), "must be a table"))
@@ -199,7 +232,7 @@ def _part(layer: str, section: Any, path: str, problems: list[Problem]) -> tuple
         problems.append(Problem(f"{path}.kind", shown(kind), f"must be one of {valid}{hint}"))
         return None
     try:
-        return str(kind), parse(part, settings)
+        return str(kind), parse(part, {**part.declared(frame), **settings})
     except ValidationError as error:
         problems.extend(problems_of(error, part, settings, path, KIND))
         return None

@@ -154,6 +154,10 @@ class Timing(Section):
     """Period of the drones' attitude controllers, s."""
     recording: Period = 0.005
     """Period of the recording, s; what happens once per allocation is recorded each time."""
+    delay: Annotated[float, Field(ge=0.0, le=0.5)] | None = None
+    """Age of what is measured when it arrives, s: of all sensors, and as the controllers are told. Each setting that says
+    otherwise, such as ``sensing.load_delay`` (the truth) or ``estimation.delay`` (what is told), goes before it; without it each
+    has its own default."""
 
     def multiples(self) -> dict[str, int]:
         """Each period as a number of physics steps."""

@@ -119,6 +119,7 @@ class DelayAware(AttitudeControlPart, Delays):
 
     kernel = _delay_aware
     remembers = MEMORY
+    delays_declared = ("delay",)
     gain_setting: ClassVar[str] = "delay"
 
     max_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 40.0

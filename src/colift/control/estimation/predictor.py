@@ -282,11 +282,12 @@ class Predictor(EstimationPart):
 
     kernel = _predict
     remembers = MEMORY
+    delays_declared = ("delay", "attitude_delay")
 
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
-    """Age of the measured positions and velocities, s."""
+    """Age of the measured positions and velocities, s; ``timing.delay`` where the mission has one."""
     attitude_delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
-    """Age of the measured attitudes, s."""
+    """Age of the measured attitudes, s; ``timing.delay`` where the mission has one."""
     lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
     """Time constant of the motors, s."""
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.005

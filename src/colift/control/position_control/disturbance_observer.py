@@ -178,6 +178,7 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     kernel = _observe_and_control
     remembers = MEMORY
+    delays_declared = ("delay",)
 
     observer: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     """Bandwidth of the observer over that of the position loop."""

@@ -210,7 +210,7 @@ class Noisy(SensingPart):
     the delay; until then the last one stands. Each axis of a sample has white noise of the given standard
     deviation and a constant bias: three numbers are that bias, one is the standard deviation with which it is
     drawn by the seed. Attitudes are turned by a small rotation about the body axes. Periods are whole multiples
-    of ``timing.step``; delays are rounded to it.
+    of ``timing.step``; delays are rounded to it, and are ``timing.delay`` where the mission has one.
 
     Defaults: camera systems err by up to 2 mm on moving objects (Merriaux et al., Sensors 17(7):1591, 2017)
     and answer in 6 to 7 ms at 200 Hz (Qualisys with ETH Zurich, 2011); gyroscopes of flight controllers
@@ -219,6 +219,7 @@ class Noisy(SensingPart):
 
     kernel = _sense
     remembers = MEMORY
+    delays_declared = tuple(f"{name}_delay" for name in _WIDTHS)
 
     load_position_noise: Size = 0.001
     """m."""
