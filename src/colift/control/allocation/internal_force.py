@@ -13,6 +13,7 @@ from colift.control.allocation.base import SIGNATURE, AllocatorPart, Status
 from colift.control.allocation.common.share import balance, begin, effort
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
+from colift.kernel.rounding import NO_TENSION
 from colift.part import Vector
 from colift.team import Team
 
@@ -58,7 +59,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         y = -force[1] / n - internal * memory[d + 1]
         z = -force[2] / n
         tensions[i] = math.sqrt(x * x + y * y + z * z)
-        if tensions[i] > 1e-15 * W:
+        if tensions[i] > NO_TENSION * W:
             directions[i, 0] = x / tensions[i]
             directions[i, 1] = y / tensions[i]
             directions[i, 2] = z / tensions[i]

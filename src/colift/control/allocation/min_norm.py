@@ -17,6 +17,7 @@ from colift.control.allocation.base import (
 from colift.control.allocation.common.share import balance, begin, effort
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
+from colift.kernel.rounding import PUSHING, RANK, UNBALANCED
 from colift.part import Places, Vector
 from colift.team import Team
 
@@ -26,9 +27,6 @@ _INVALID_FORCE = int(Status.INVALID_FORCE)
 _CLAMPED = int(Status.CLAMPED)
 _FORCE_REDUCED = int(Status.FORCE_REDUCED)
 _PUSHING = int(Status.PUSHING)
-
-RANK = 1e-9
-"""A cable whose part outside the span of those before it is smaller adds no direction."""
 
 _UNKNOWN, _GIVEN, _READY = 0.0, 1.0, 2.0  # of the formation, and of its inverse
 
@@ -104,7 +102,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     for i in range(n):
         side = 1.0
         if tensions[i] < 0.0:
-            negative = negative or tensions[i] < -1e-12 * W
+            negative = negative or tensions[i] < -PUSHING * W
             if params[P.push] == 0.0:
                 tensions[i] = 0.0
             else:
@@ -113,7 +111,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         for k in range(3):
             directions[i, k] = side * formation[i, k]
     effort(W, tensions, info)
-    missing = balance(force, tensions, directions, info) > 1e-9 * W
+    missing = balance(force, tensions, directions, info) > UNBALANCED * W
     if missing:
         info[INFO_GAP] = math.nan
     if negative:

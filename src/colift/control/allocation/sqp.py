@@ -24,6 +24,7 @@ from colift.control.allocation.paper import newton
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.columns import column
+from colift.kernel.rounding import FAINT, NO_FORCE
 from colift.part import Vector
 from colift.team import Team
 
@@ -65,7 +66,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         info[INFO_OBJECTIVE] = math.nan
         info[INFO_BALANCE] = math.nan
         return _INVALID_FORCE
-    if 1e-9 * math.sqrt(mu) >= W or W <= 1e-12:
+    if FAINT * math.sqrt(mu) >= W or W <= NO_FORCE:
         for i in range(n):
             T[i] = 0.0
         memory[M.size] = 0.0

@@ -16,6 +16,7 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
+from colift.kernel.rounding import NO_TIME, WHOLE
 from colift.part import Setup, Vector
 from colift.team import Team
 
@@ -53,7 +54,7 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
     Omega_d = sees.desired_rates
     tau = writes.torques
     n = q.shape[0]
-    past = min(int((params[P.delay] + params[P.coast]) / dt + 1e-9) + 1, _MOST - 1)
+    past = min(int((params[P.delay] + params[P.coast]) / dt + WHOLE) + 1, _MOST - 1)
     keep = decay(dt, params[P.lag])
     linger = (
         (1.0 - keep) * params[P.lag] / dt
@@ -68,13 +69,13 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
         silence = min(max(memory[o + M.silence] - params[P.steady], 0.0), params[P.coast])
         # Whole periods of the age of what is measured, and what is left over of one more.
         span = params[P.delay] + silence
-        whole = min(int(span / dt + 1e-9), _MOST - 1)
+        whole = min(int(span / dt + WHOLE), _MOST - 1)
         rest = min(max(span - whole * dt, 0.0), dt) if whole < _MOST - 1 else 0.0
         w, x, y, z = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
         rx, ry, rz = Omega[i, 0], Omega[i, 1], Omega[i, 2]
         for j in range(whole, -1, -1):
             step = rest if j == whole else dt
-            if step > 1e-12:
+            if step > NO_TIME:
                 # Half a step of the rates, the turn by the rate in the middle, the whole step.
                 tx, ty, tz = memory[was + 3 * j], memory[was + 3 * j + 1], memory[was + 3 * j + 2]
                 ax, ay, az = _spin(params, c, tx, ty, tz, rx, ry, rz)

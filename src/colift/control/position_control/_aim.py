@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from colift.kernel.jit import inline
 from colift.kernel.math import quaternion
+from colift.kernel.rounding import NO_THRUST
 
 AIM = 6
 """Numbers that it remembers of a drone."""
@@ -17,7 +18,7 @@ def aim(i, fresh, dt, keep, u, norm, memory, o, thrusts, attitudes, rates):  # t
     the old rate that the filter keeps.
     """
     thrusts[i] = norm
-    if norm > 1e-9:
+    if norm > NO_THRUST:
         hx, hy, hz = u[i, 0] / norm, u[i, 1] / norm, u[i, 2] / norm
     else:
         hx, hy, hz = 0.0, 0.0, 1.0

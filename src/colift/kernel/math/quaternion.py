@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from colift.kernel.jit import inline
+from colift.kernel.rounding import DOWNWARD
 
 
 @inline
@@ -34,7 +35,7 @@ def from_thrust_direction(ux, uy, uz):  # type: ignore[no-untyped-def]
     Near ``u = -e3``, where the formula divides by zero, the limit along x is returned.
     """
     squared = 2.0 * uz + 2.0
-    if squared < 1e-12:
+    if squared < DOWNWARD:
         return (0.0, 1.0, 0.0, 0.0)
     root = math.sqrt(squared)
     return (0.5 * root, -uy / root, ux / root, 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from colift.kernel.jit import inline
+from colift.kernel.rounding import NO_TURN
 
 FOLLOW = 9
 """Numbers that :func:`follow` keeps: direction, rate, acceleration."""
@@ -26,7 +27,7 @@ def follow(memory, o, tx, ty, tz, omega, dt, reach=math.pi):  # type: ignore[no-
     c = ax * tx + ay * ty + az * tz
     ex, ey, ez = tx - c * ax, ty - c * ay, tz - c * az
     s = math.sqrt(ex * ex + ey * ey + ez * ez)
-    scale = min(math.atan2(s, c), reach) / s if s > 1e-12 else 1.0
+    scale = min(math.atan2(s, c), reach) / s if s > NO_TURN else 1.0
     gain = omega * omega * scale
     # Damping implicitly: stable for any step.
     damp = 1.0 / (1.0 + 2.0 * omega * dt)
@@ -36,7 +37,7 @@ def follow(memory, o, tx, ty, tz, omega, dt, reach=math.pi):  # type: ignore[no-
     px, py, pz = (ux - bx) / dt, (uy - by) / dt, (uz - bz) / dt
     speed = math.sqrt(ux * ux + uy * uy + uz * uz)
     angle = min(speed * dt, 1.0)
-    if speed > 1e-12:
+    if speed > NO_TURN:
         sine, cosine = math.sin(angle), math.cos(angle)
         hx, hy, hz = ux / speed, uy / speed, uz / speed
         nx, ny, nz = cosine * ax + sine * hx, cosine * ay + sine * hy, cosine * az + sine * hz

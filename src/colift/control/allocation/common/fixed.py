@@ -12,6 +12,7 @@ from colift.control.allocation.paper.newton import rotate
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.columns import column
+from colift.kernel.rounding import UNBALANCED
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array, min_norm_tensions
@@ -47,7 +48,7 @@ def allocate_fixed(now, sees, params, memory, writes):  # type: ignore[no-untype
     rotate(n, 0.0, 0.0, 1.0, force[0] / W, force[1] / W, force[2] / W, alpha, memory)
     for i in range(n):
         tensions[i] = W * shares[i]
-    return _CONVERGED if balance(force, tensions, directions, info) <= 1e-9 * W else _CLAMPED
+    return _CONVERGED if balance(force, tensions, directions, info) <= UNBALANCED * W else _CLAMPED
 
 
 class FixedPattern(AllocatorPart):

@@ -11,6 +11,7 @@ from colift.control.allocation.base import (
     INFO_RESIDUAL,
 )
 from colift.kernel.jit import inline
+from colift.kernel.rounding import NO_FORCE
 
 
 @inline
@@ -26,7 +27,7 @@ def begin(force, tensions, info):  # type: ignore[no-untyped-def]
         info[INFO_BALANCE] = math.nan
         return math.nan
     info[INFO_BALANCE] = W
-    if W <= 1e-12:
+    if W <= NO_FORCE:
         for i in range(tensions.shape[0]):
             tensions[i] = 0.0
         return 0.0

@@ -41,6 +41,7 @@ from __future__ import annotations
 import math
 
 from colift.kernel.jit import inline
+from colift.kernel.rounding import LEAST_DAMPING, LEVEL, SETTLED
 
 ROW = 28
 """Workspace per cable: B (6), v (2), C^-1 q (2), C^-1 U^T (16), taut flag, spare."""
@@ -56,9 +57,6 @@ def workspace_size(n: int) -> int:
 
 DAMPING = 0.1
 """Levenberg-Marquardt factor: delta = DAMPING * residual."""
-
-LEAST_DAMPING = 1e-4
-"""Floor of delta: dividing by less amplifies rounding, and the residual stalls near 1e-11."""
 
 MAX_TURN = 0.7
 """Largest turn of one cable in one iteration, rad."""
@@ -84,7 +82,7 @@ def optimal_alignment(n, mu):  # type: ignore[no-untyped-def]
         slope = mu * a * (3.0 * lead * a - 2.0 * shift)
         step = value / slope
         a -= step
-        if abs(step) <= 1e-15 * n:
+        if abs(step) <= SETTLED * n:
             break
     return a
 
@@ -531,7 +529,7 @@ def solve(n, fx, fy, fz, mu, tolerance, max_iterations, T, alpha, lam, work, inf
         for _ in range(12):
             total = trial_point(n, fx, fy, fz, s, T, alpha, rows, T_new, alpha_new)
             J_new = measure(n, mu, T_new, alpha_new, M_new)
-            if total > 0.5 and J_new <= J + 1e-4 * s * slope + 1e-13 * J:
+            if total > 0.5 and J_new <= J + 1e-4 * s * slope + LEVEL * J:
                 accepted = True
                 break
             s *= 0.5
