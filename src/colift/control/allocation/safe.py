@@ -67,30 +67,34 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     limits = C.rows + C.width * n
     near = limits + L.width * count
     square = near + N.width * most
-    data = column(memory, C.rows, n, CABLES.data)
-    T = column(memory, C.rows, n, CABLES.T)
-    alpha = column(memory, C.rows, n, CABLES.alpha)
+    work = newton.Work(
+        data=column(memory, C.rows, n, CABLES.data),
+        T=column(memory, C.rows, n, CABLES.T),
+        alpha=column(memory, C.rows, n, CABLES.alpha),
+        w=column(memory, C.rows, n, CABLES.w),
+        dw=column(memory, C.rows, n, CABLES.dw),
+        w_new=column(memory, C.rows, n, CABLES.w_new),
+        g=column(memory, limits, count, LIMITS.g),
+        g_new=column(memory, limits, count, LIMITS.g_new),
+        z=column(memory, limits, count, LIMITS.z),
+        pairs=column(memory, near, most, PAIRS.both),
+        kappa_pair=column(memory, near, most, PAIRS.kappa),
+        cos_max=column(memory, near, most, PAIRS.cos_max),
+        first=column(memory, C.rows, n, CABLES.first),
+        rows=column(memory, C.rows, n, CABLES.row),
+        K=memory[square : square + 4 * n * n],
+        Y=column(memory, C.rows, n, CABLES.Y),
+        S=column(memory, 0, 1, CABLES.S),
+        lam=column(memory, 0, 1, CABLES.lam),
+        M=column(memory, 0, 1, CABLES.M),
+    )
+    data, T, alpha, M = work.data, work.T, work.alpha, work.M
     start = column(memory, C.rows, n, CABLES.start)
-    w = column(memory, C.rows, n, CABLES.w)
-    dw = column(memory, C.rows, n, CABLES.dw)
-    w_new = column(memory, C.rows, n, CABLES.w_new)
-    rows = column(memory, C.rows, n, CABLES.row)
-    Y = column(memory, C.rows, n, CABLES.Y)
     order = column(memory, C.rows, n, CABLES.order)
-    first = column(memory, C.rows, n, CABLES.first)
-    g = column(memory, limits, count, LIMITS.g)
-    g_new = column(memory, limits, count, LIMITS.g_new)
-    z = column(memory, limits, count, LIMITS.z)
-    kappa_pair = column(memory, near, most, PAIRS.kappa)
-    cos_max = column(memory, near, most, PAIRS.cos_max)
-    pairs = column(memory, near, most, PAIRS.both)
-    K = memory[square : square + 4 * n * n]
-    S = column(memory, 0, 1, CABLES.S)
-    lam = column(memory, 0, 1, CABLES.lam)
-    M = column(memory, 0, 1, CABLES.M)
     facing = column(memory, 0, 1, CABLES.facing)
     yielded = column(memory, 0, 1, CABLES.yielded)
     asked = column(memory, 0, 1, CABLES.asked)
+    kinds = int(params[P.limits])
 
     for k in range(info.shape[0]):
         info[k] = 0.0
@@ -118,79 +122,34 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
 
     cycle.sort_cables(n, directions, order)
     relaxed = cycle.set_up(
-        n,
-        order,
-        W,
-        unit,
-        delta,
-        acceleration,
-        tensions,
-        directions,
-        params,
-        data,
-        T,
-        start,
-        alpha,
-        w,
+        n, order, W, unit, delta, acceleration, tensions, directions, params, start, work
     )
     if W > 1e-6 and not relaxed:
         follow = period / (params[P.turning] + period)
-        cycle.turn_home(n, fx, fy, fz, W, follow, cycle.TURN * delta, data, facing, w_new, dw)
-    m = cycle.near_pairs(
-        n,
-        params[P.min_angle],
-        max(params[P.reach], 2.0 * delta),
-        params[P.kappa_pair],
-        start,
-        alpha,
-        pairs,
-        first,
-        kappa_pair,
-        cos_max,
-    )
+        cycle.turn_home(n, fx, fy, fz, W, follow, cycle.TURN * delta, facing, work)
+    reach = max(params[P.reach], 2.0 * delta)
+    m = cycle.near_pairs(n, params[P.min_angle], reach, params[P.kappa_pair], start, work)
     heavy = max(1.0, abs(fz) / n)
     leaning = 0.0
     if yielded[0] > 0.0:
         leaning = cycle.leaning_now(fx, fy, fz, W, delta, yielded, asked)
-    outcome = cycle.iterate(
-        n,
-        int(params[P.limits]),
-        m,
-        fx,
-        fy,
-        fz,
-        mu,
-        rho,
-        params[P.kappa],
-        0.5 * params[P.kappa_rate] * max(rho, 1.0) * delta * delta,
-        params[P.kappa_pair],
-        params[P.price] * heavy,
-        yielded[0] != 0.0,
-        leaning,
-        params[P.tolerance],
-        int(params[P.iterations]),
-        pairs,
-        first,
-        kappa_pair,
-        cos_max,
-        data,
-        T,
-        alpha,
-        w,
-        dw,
-        w_new,
-        g,
-        g_new,
-        z,
-        rows,
-        K,
-        Y,
-        S,
-        lam,
-        M,
-        info,
+    task = cycle.Task(
+        fx=fx,
+        fy=fy,
+        fz=fz,
+        mu=mu,
+        rho=rho,
+        kappa=params[P.kappa],
+        kappa_rate=0.5 * params[P.kappa_rate] * max(rho, 1.0) * delta * delta,
+        spread=params[P.kappa_pair],
+        price=params[P.price] * heavy,
+        yielding=yielded[0] != 0.0,
+        leaning=leaning,
+        tolerance=params[P.tolerance],
+        max_iterations=int(params[P.iterations]),
     )
-    info[INFO_ACTIVE] = cycle.active_limits(n, int(params[P.limits]), m, z)
+    outcome = cycle.iterate(n, kinds, m, task, work, info)
+    info[INFO_ACTIVE] = cycle.active_limits(n, kinds, m, work.z)
     squares = M[0] * M[0] + M[3] * M[3] + M[5] * M[5]
     squares += 2.0 * (M[1] * M[1] + M[2] * M[2] + M[4] * M[4])
     J = 0.5 * mu * (squares - n)
@@ -212,7 +171,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
     reduced = balance > 1e-8 * max(1.0, sigma)
     yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
-    if relaxed and cycle.breaks_a_limit(n, order, unit, params, data, T, alpha):
+    if relaxed and cycle.breaks_a_limit(n, order, unit, params, work):
         return _RECOVERING
     if reduced:
         return _FORCE_REDUCED

@@ -13,6 +13,7 @@ This file imports only the compiler front end and the names of places.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from colift.control.allocation.limits import newton, recovery
 from colift.control.allocation.paper.newton import rotate
@@ -75,6 +76,27 @@ RETRIES = 8
 """Most step lengths tried in one iteration."""
 
 
+class Task(NamedTuple):
+    """What one cycle is asked: the wanted force and the weights, scaled, and when to stop."""
+
+    fx: float
+    fy: float
+    fz: float
+    mu: float
+    rho: float
+    kappa: float
+    kappa_rate: float
+    spread: float
+    price: float
+    """Of horizontal force that is missing."""
+    yielding: bool
+    """The last answer gave force up."""
+    leaning: float
+    """By how much the formation leans then, rad."""
+    tolerance: float
+    max_iterations: int
+
+
 @inline
 def sort_cables(n, directions, order):  # type: ignore[no-untyped-def]
     """Order the cables along the x axis, from the last cycle's order: neighbours get close numbers.
@@ -100,7 +122,7 @@ def sort_cables(n, directions, order):  # type: ignore[no-untyped-def]
 
 
 @inline
-def turn_home(n, fx, fy, fz, W, follow, most, data, facing, homes, spare):  # type: ignore[no-untyped-def]
+def turn_home(n, fx, fy, fz, W, follow, most, facing, work):  # type: ignore[no-untyped-def]
     """Turn the directions that the proximal term holds on to with the force, which is followed smoothly.
 
     ``facing`` (3,) is the direction followed so far, zero at the start; ``follow`` the share of the way to
@@ -109,6 +131,7 @@ def turn_home(n, fx, fy, fz, W, follow, most, data, facing, homes, spare):  # ty
     directions as strongly as the proximal term (``RATE_BARRIER``), and does not turn: twice the turn
     puts the middle of both where it should be.
     """
+    data, homes, spare = work.data, work.w_new, work.dw
     x, y, z = fx / W, fy / W, fz / W
     ax, ay, az = facing[0], facing[1], facing[2]
     if ax * ax + ay * ay + az * az > 0.5:
@@ -133,9 +156,10 @@ def turn_home(n, fx, fy, fz, W, follow, most, data, facing, homes, spare):  # ty
 
 @inline
 def set_up(  # type: ignore[no-untyped-def]
-    n, order, W, unit, delta, acceleration, tensions, directions, params, data, T, start, alpha, w
+    n, order, W, unit, delta, acceleration, tensions, directions, params, start, work
 ):
     """Limits of every cable in this cycle and a strictly feasible ``w``; whether one was relaxed."""
+    data, T, alpha, w = work.data, work.T, work.alpha, work.w
     vers = 2.0 * math.sin(0.5 * delta) ** 2
     cos_cone = math.cos(params[P.cone])
     for i in range(n):
@@ -210,8 +234,9 @@ def set_up(  # type: ignore[no-untyped-def]
 
 
 @inline
-def breaks_a_limit(n, order, unit, params, data, T, alpha):  # type: ignore[no-untyped-def]
+def breaks_a_limit(n, order, unit, params, work):  # type: ignore[no-untyped-def]
     """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
+    data, T, alpha = work.data, work.T, work.alpha
     cos_angle, cos_cone = math.cos(params[P.min_angle]), math.cos(params[P.cone])
     if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, alpha):
         return True
@@ -258,12 +283,14 @@ def drone_limits(d, mass, thrust, gravity, tilt, acceleration, data):  # type: i
 
 
 @inline
-def near_pairs(n, min_angle, reach, kappa, start, alpha, pairs, first, kappa_pair, cos_max):  # type: ignore[no-untyped-def]
+def near_pairs(n, min_angle, reach, kappa, start, work):  # type: ignore[no-untyped-def]
     """List the pairs ``(i, j)``, ``j < i``, closer than ``min_angle + reach``; their number.
 
     ``first[i]`` becomes the first neighbour of cable i: the envelope of the sparse matrix. A pair that
     is too close may not come closer than half of the way that recovery gained.
     """
+    alpha, pairs, first = work.alpha, work.pairs, work.first
+    kappa_pair, cos_max = work.kappa_pair, work.cos_max
     limit = math.cos(min_angle)
     edge = math.cos(min(min_angle + reach, math.pi))
     scale = 1.0 / (limit - edge)
@@ -315,44 +342,7 @@ def slight_cost(n, mu, rho, data):  # type: ignore[no-untyped-def]
 
 
 @inline
-def iterate(  # type: ignore[no-untyped-def]
-    n,
-    limits,
-    m,
-    fx,
-    fy,
-    fz,
-    mu,
-    rho,
-    kappa,
-    kappa_rate,
-    spread,
-    price,
-    yielding,
-    leaning,
-    tolerance,
-    max_iterations,
-    pairs,
-    first,
-    kappa_pair,
-    cos_max,
-    data,
-    T,
-    alpha,
-    w,
-    dw,
-    w_new,
-    g,
-    g_new,
-    z,
-    rows,
-    K,
-    Y,
-    S,
-    lam,
-    M,
-    info,
-):
+def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
     """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above.
 
     Two phases. In the first the objective is the whole cost, and force may be missing at a price.
@@ -362,7 +352,11 @@ def iterate(  # type: ignore[no-untyped-def]
     missing, what holds on to the last directions shrinks in the end to the part ``SHARP``, so that the cables turn as
     far as their rate allows. ``yielding`` starts with the second phase, in which the formation leans by ``leaning`` rad.
     """
-    newton.margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g)
+    fx, fy, fz, mu, rho, kappa, kappa_rate, spread = task[:8]
+    price, yielding, leaning, tolerance, max_iterations = task[8:]
+    data, kappa_pair, w, w_new = work.data, work.kappa_pair, work.w, work.w_new
+    g, g_new, z, S, lam = work.g, work.g_new, work.z, work.S, work.lam
+    newton.margins(n, limits, m, work, w, g)
     spread_now = spread
     iterations = 0
     waited = 0
@@ -419,29 +413,10 @@ def iterate(  # type: ignore[no-untyped-def]
             for k in range(m):
                 kappa_pair[k] *= ratio
                 z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
-        newton.assemble(
-            n,
-            limits,
-            m,
-            pairs,
-            cost,
-            mu_now,
-            rho_now,
-            kappa_now,
-            rate_now,
-            kappa_pair,
-            data,
-            T,
-            alpha,
-            g,
-            z,
-            M,
-            rows,
-            K,
-            first,
-        )
+        weights = newton.Weights(cost, mu_now, rho_now, kappa_now, rate_now)
+        newton.assemble(n, limits, m, weights, work)
         if iterations > 0:
-            residual = newton.stationarity(n, alpha, rows, lam)
+            residual = newton.stationarity(n, work)
             if not fresh and yielding and residual <= tolerance * level:
                 missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
                 blamed = FIRM * (limits * n + m)
@@ -462,7 +437,7 @@ def iterate(  # type: ignore[no-untyped-def]
             if iterations >= max_iterations:
                 break
         fresh = False
-        if not newton.factor(n, shift, mu_now, T, alpha, rows, K, first, Y):
+        if not newton.factor(n, shift, mu_now, work):
             # Not convex here: build again, with a larger shift.
             shift = max(1e-2, 30.0 * shift)
             attempts += 1
@@ -471,13 +446,13 @@ def iterate(  # type: ignore[no-untyped-def]
             continue
         attempts = 0
         iterations += 1
-        newton.reduced_system(n, alpha, rows, Y, rx, ry, rz, S)
+        newton.reduced_system(n, rx, ry, rz, work)
         bounded = newton.multiplier(S, bound_h, bound_v)
-        newton.back_substitute(n, alpha, rows, K, first, Y, S, dw)
+        newton.back_substitute(n, work)
         lam[0] = S[69]
         lam[1] = S[70]
         lam[2] = S[71]
-        s = longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, g_new)
+        s = longest_step(n, limits, m, work)
         for k in range(3 * n):
             w[k] = w_new[k]
         for i in range(n):
@@ -521,13 +496,14 @@ def leaning_now(fx, fy, fz, W, delta, yielded, asked):  # type: ignore[no-untype
 
 
 @inline
-def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, g_new):  # type: ignore[no-untyped-def]
+def longest_step(n, limits, m, work):  # type: ignore[no-untyped-def]
     """Longest step, at most 1, that leaves every limit the part ``KEEP`` of its margin; 0 if none.
 
     Along a step most limits are concave, so that their secant gives a step that keeps them. Pairs and the least
     tension are not, but they are nearly linear within what the other limits allow. On return
     ``w_new``, ``T``, ``alpha`` and ``g_new`` belong to that step.
     """
+    data, w, dw, w_new, g, g_new = work.data, work.w, work.dw, work.w_new, work.g, work.g_new
     s = 1.0
     for trial in range(RETRIES + 1):
         if trial == RETRIES:
@@ -537,7 +513,7 @@ def longest_step(n, limits, m, pairs, cos_max, data, T, alpha, w, dw, w_new, g, 
         else:
             for k in range(3 * n):
                 w_new[k] = w[k] + s * dw[k]
-        newton.margins(n, limits, m, pairs, cos_max, data, w_new, T, alpha, g_new)
+        newton.margins(n, limits, m, work, w_new, g_new)
         if s == 0.0:
             break
         ratio = 1.0

@@ -47,6 +47,7 @@ This file imports only the compiler front end.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from colift.kernel.jit import inline
 
@@ -68,12 +69,54 @@ RHS = 9
 SYSTEM = 8 * 8 + 8
 
 
-@inline
-def margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g):  # type: ignore[no-untyped-def]
-    """From ``w``: tensions, directions and the value of every limit, cables first, then pairs.
+class Work(NamedTuple):
+    """Arrays of one cycle, all flat: per cable (n), per limit ``LIMITS n + m``, per near pair (m)."""
 
-    False as soon as one limit is not strictly positive (or not a number); ``g`` is filled all the same.
-    """
+    data: Any
+    """``DATA`` per cable: what the cycle asks of it."""
+    T: Any
+    alpha: Any
+    """Tensions (n) and directions (3n) of the iterate."""
+    w: Any
+    dw: Any
+    w_new: Any
+    """Forces of the cables, the step, and where it leads (3n)."""
+    g: Any
+    g_new: Any
+    z: Any
+    """Value of every limit, before and after a step, and its multiplier."""
+    pairs: Any
+    """Cables ``i, j`` of every near pair (2m), ``j < i``."""
+    kappa_pair: Any
+    cos_max: Any
+    """Barrier of every near pair, and the largest cosine of its angle."""
+    first: Any
+    """First near neighbour of every cable."""
+    rows: Any
+    """``ROW`` per cable and step."""
+    K: Any
+    Y: Any
+    S: Any
+    """The matrix and its factor, ``L^-1 [U^T, q]``, the reduced system."""
+    lam: Any
+    M: Any
+    """Multiplier of the force balance (3), ``sum alpha alpha^T`` (6)."""
+
+
+class Weights(NamedTuple):
+    """Weights of the objective in one phase of the iteration, scaled."""
+
+    cost: float
+    mu: float
+    rho: float
+    kappa: float
+    kappa_rate: float
+
+
+@inline
+def margins(n, limits, m, work, w, g):  # type: ignore[no-untyped-def]
+    """From ``w``: tensions, directions and the value of every limit, cables first, then pairs."""
+    data, T, alpha, pairs, cos_max = work.data, work.T, work.alpha, work.pairs, work.cos_max
     for i in range(n):
         d = DATA * i
         x = w[3 * i]
@@ -114,28 +157,12 @@ def margins(n, limits, m, pairs, cos_max, data, w, T, alpha, g):  # type: ignore
 
 
 @inline
-def assemble(  # type: ignore[no-untyped-def]
-    n,
-    limits,
-    m,
-    pairs,
-    cost,
-    mu,
-    rho,
-    kappa,
-    kappa_rate,
-    kappa_pair,
-    data,
-    T,
-    alpha,
-    g,
-    z,
-    M,
-    rows,
-    K,
-    first,
-):
+def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
     """Gradient and Hessian at ``(T, alpha)``: fills ``rows`` and the pair blocks of ``K``."""
+    cost, mu, rho, kappa, kappa_rate = weights
+    data, T, alpha, g, z, M = work.data, work.T, work.alpha, work.g, work.z, work.M
+    pairs, kappa_pair, first = work.pairs, work.kappa_pair, work.first
+    rows, K = work.rows, work.K
     size = 2 * n
     xx = xy = xz = yy = yz = zz = 0.0
     for i in range(n):
@@ -334,8 +361,9 @@ def assemble(  # type: ignore[no-untyped-def]
 
 
 @inline
-def stationarity(n, alpha, rows, lam):  # type: ignore[no-untyped-def]
+def stationarity(n, work):  # type: ignore[no-untyped-def]
     """Largest component over the cables of the Lagrangian's gradient (scaled force)."""
+    alpha, rows, lam = work.alpha, work.rows, work.lam
     worst = 0.0
     for i in range(n):
         o = ROW * i
@@ -349,11 +377,13 @@ def stationarity(n, alpha, rows, lam):  # type: ignore[no-untyped-def]
 
 
 @inline
-def factor(n, shift, mu, T, alpha, rows, K, first, Y):  # type: ignore[no-untyped-def]
+def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
     """Eliminate ``tau``; Cholesky of ``K + shift I`` in its envelope; ``Y = L^-1 [U^T, q]``.
 
     False if ``K + shift I`` is not positive definite.
     """
+    T, alpha, first = work.T, work.alpha, work.first
+    rows, K, Y = work.rows, work.K, work.Y
     size = 2 * n
     root = math.sqrt(2.0 * mu)
     root_a = math.sqrt(2.0 * mu)
@@ -444,8 +474,9 @@ def factor(n, shift, mu, T, alpha, rows, K, first, Y):  # type: ignore[no-untype
 
 
 @inline
-def reduced_system(n, alpha, rows, Y, rx, ry, rz, S):  # type: ignore[no-untyped-def]
+def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
     """Lower triangle and right-hand side (row 8) of the 8x8 system, ``(rx, ry, rz) = sum w + F``."""
+    alpha, rows, Y, S = work.alpha, work.rows, work.Y, work.S
     for k in range(SYSTEM):
         S[k] = 0.0
     for k in range(5):
@@ -542,8 +573,10 @@ def multiplier(S, bound_h, bound_v):  # type: ignore[no-untyped-def]
 
 
 @inline
-def back_substitute(n, alpha, rows, K, first, Y, S, dw):  # type: ignore[no-untyped-def]
-    """``dw`` of every cable from the solution in ``S[64:]``; the largest squared ``|dw|`` is returned."""
+def back_substitute(n, work):  # type: ignore[no-untyped-def]
+    """``dw`` of every cable from the solution in ``S[64:]``."""
+    alpha, first, dw = work.alpha, work.first, work.dw
+    rows, K, Y, S = work.rows, work.K, work.Y, work.S
     size = 2 * n
     for r in range(2 * n):
         o = RHS * r
@@ -552,7 +585,6 @@ def back_substitute(n, alpha, rows, K, first, Y, S, dw):  # type: ignore[no-unty
             value += Y[o + k] * S[64 + k]
         Y[o + 8] = -value
     lx, ly, lz = S[69], S[70], S[71]
-    worst = 0.0
     for i in range(n - 1, -1, -1):
         top = size * 2 * i
         low = top + size
@@ -573,5 +605,3 @@ def back_substitute(n, alpha, rows, K, first, Y, S, dw):  # type: ignore[no-unty
         dw[3 * i] = dx
         dw[3 * i + 1] = dy
         dw[3 * i + 2] = dz
-        worst = max(worst, dx * dx + dy * dy + dz * dz)
-    return worst
