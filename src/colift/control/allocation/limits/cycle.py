@@ -72,6 +72,8 @@ LEANING = 50.0
 CHANGE = 1e-3
 SLIGHT = 1e-3
 """Largest part of the cost that is left then."""
+DRIFT = 4.0
+"""Of a residual, a step with the matrix of the step before leaves the relative change of the limits times this."""
 RETRIES = 8
 """Most step lengths tried in one iteration."""
 
@@ -294,11 +296,15 @@ def near_pairs(n, min_angle, reach, kappa, start, work):  # type: ignore[no-unty
     limit = math.cos(min_angle)
     edge = math.cos(min(min_angle + reach, math.pi))
     scale = 1.0 / (limit - edge)
+    wide = recovery.window(n, edge, alpha)
     m = 0
+    begin = 0
     for i in range(n):
         x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
         first[i] = i
-        for j in range(i):
+        while x - alpha[3 * begin] > wide:
+            begin += 1
+        for j in range(begin, i):
             c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
             if c > edge:
                 if first[i] == i:
@@ -371,6 +377,9 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
     outcome = ITERATION_LIMIT
     shift = 0.0
     attempts = 0
+    s = 0.0
+    drift = origin = math.inf
+    again = False
     cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
     bound_h, bound_v = price, price * VERTICAL_FIRST
     level = 1.0
@@ -414,54 +423,76 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
                 kappa_pair[k] *= ratio
                 z[newton.LIMITS * n + k] = kappa_pair[k] / g[newton.LIMITS * n + k]
         weights = newton.Weights(cost, mu_now, rho_now, kappa_now, rate_now)
-        newton.assemble(n, limits, m, weights, work)
-        if iterations > 0:
-            residual = newton.stationarity(n, work)
-            if not fresh and yielding and residual <= tolerance * level:
-                missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
-                blamed = FIRM * (limits * n + m)
-                if missing <= blamed and level < 1e3:
-                    level *= 10.0
-                    bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
-                elif not sharp and missing > FAR * blamed:
-                    # The turn is to be used to the full where much force is given up.
-                    sharp = True
-                    rate_now *= SHARP
-                    rho_now *= SHARP
-                else:
-                    outcome = FORCE_REDUCED
-                    break
-            if not fresh and not yielding and residual <= tolerance and held:
+        settled = held and not yielding and not fresh and iterations > 0
+        # How much a step with the same matrix leaves: of barriers as of the change of their limits.
+        left = DRIFT * drift
+        # A full step leaves what it began with times that change, nearly.
+        if settled and (again or origin * drift * min(left, 1.0) <= tolerance):
+            known = True
+            residual = newton.gradient(n, limits, m, weights, work)
+            if residual <= tolerance:
                 outcome = CONVERGED
                 break
             if iterations >= max_iterations:
                 break
-        fresh = False
-        if not newton.factor(n, shift, mu_now, work):
-            # Not convex here: build again, with a larger shift.
-            shift = max(1e-2, 30.0 * shift)
-            attempts += 1
-            if attempts > 12:
-                break
-            continue
-        attempts = 0
+            if again:
+                left = residual / origin
+            again = attempts == 0 and s == 1.0 and residual * left <= tolerance
+        else:
+            known = again = False
+        if not again:
+            newton.assemble(n, limits, m, weights, work)
+            if iterations > 0 and not known:
+                residual = newton.stationarity(n, work)
+                if not fresh and yielding and residual <= tolerance * level:
+                    missing = bound_h * math.sqrt(rx * rx + ry * ry) + bound_v * abs(rz)
+                    blamed = FIRM * (limits * n + m)
+                    if missing <= blamed and level < 1e3:
+                        level *= 10.0
+                        bound_h, bound_v = FORCE * level, FORCE * VERTICAL_FIRST * level
+                    elif not sharp and missing > FAR * blamed:
+                        # The turn is to be used to the full where much force is given up.
+                        sharp = True
+                        rate_now *= SHARP
+                        rho_now *= SHARP
+                    else:
+                        outcome = FORCE_REDUCED
+                        break
+                if settled and residual <= tolerance:
+                    outcome = CONVERGED
+                    break
+                if iterations >= max_iterations:
+                    break
+            fresh = False
+            if not newton.factor(n, shift, mu_now, work):
+                # Not convex here: build again, with a larger shift.
+                shift = max(1e-2, 30.0 * shift)
+                attempts += 1
+                if attempts > 12:
+                    break
+                continue
+            attempts = 0
+            newton.reduced_system(n, rx, ry, rz, work)
+        else:
+            newton.next_right_side(n, rx, ry, rz, work)
         iterations += 1
-        newton.reduced_system(n, rx, ry, rz, work)
-        bounded = newton.multiplier(S, bound_h, bound_v)
-        newton.back_substitute(n, work)
+        bounded = newton.multiplier(S, bound_h, bound_v, again)
+        origin = newton.back_substitute(n, work)
         lam[0] = S[69]
         lam[1] = S[70]
         lam[2] = S[71]
         s = longest_step(n, limits, m, work)
         for k in range(3 * n):
             w[k] = w_new[k]
+        drift = 0.0
         for i in range(n):
             for k in range(limits):
                 weight = rate_now if k == newton.RATE else kappa_now
                 c = newton.LIMITS * i + k
-                update_multiplier(c, weight, s, g, g_new, z)
+                drift = max(drift, update_multiplier(c, weight, s, g, g_new, z))
         for k in range(m):
-            update_multiplier(newton.LIMITS * n + k, kappa_pair[k], s, g, g_new, z)
+            c = newton.LIMITS * n + k
+            drift = max(drift, update_multiplier(c, kappa_pair[k], s, g, g_new, z))
         waited += 2 if bounded else 1
         shift = 0.1 * shift if shift > 1e-2 else 0.0
         if s == 0.0:
@@ -562,9 +593,15 @@ def cone_step(ux, uy, uz, c, kept, x, y, z, dx, dy, dz):  # type: ignore[no-unty
 
 @inline
 def update_multiplier(c, kappa, s, g, g_new, z):  # type: ignore[no-untyped-def]
-    """Newton step of ``z g = kappa`` with the change of ``g`` that took place; safeguarded."""
-    old, new, multiplier = g[c], g_new[c], z[c]
-    multiplier += s * (kappa / old - multiplier) - multiplier * (new - old) / old
+    """Newton step of ``z g = kappa`` with the change of ``g`` that took place; safeguarded.
+
+    Returns that change, relative.
+    """
+    new, multiplier = g_new[c], z[c]
+    inverse = 1.0 / g[c]
+    change = (new - g[c]) * inverse
+    multiplier += s * (kappa * inverse - multiplier) - multiplier * change
     central = kappa / new
     z[c] = min(max(multiplier, central / Z_BAND), central * Z_BAND)
     g[c] = new
+    return abs(change)

@@ -61,7 +61,9 @@ A, OMEGA, T_MIN, T_MAX, COS_CONE, VERS_RATE = 0, 3, 4, 5, 6, 7
 P, F_MAX, COS_TILT, HOME = 8, 11, 12, 13
 
 ROW = 20
-"""Per cable and step: B (6), gamma and its barrier version (4), C (3), q (2), h (2), h_tt, r_t, curvature."""
+"""Per cable and step: B (6), alpha (3), spare, C (3), q (2), h (2), h_tt, r_t, 1 / h_tt.
+
+While the pairs are summed up, ``gamma`` and its barrier version stand where ``alpha`` is in the end."""
 
 RHS = 9
 """Columns of the right-hand side: zeta (5), lam (3), q."""
@@ -349,6 +351,9 @@ def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
             rt -= k5 * va
             q1 -= k5 * v1
             q2 -= k5 * v2
+        rows[o + 6] = x
+        rows[o + 7] = y
+        rows[o + 8] = zc
         rows[o + 10] = c11
         rows[o + 11] = c12
         rows[o + 12] = c22
@@ -358,6 +363,84 @@ def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
         rows[o + 16] = h2
         rows[o + 17] = htt
         rows[o + 18] = rt
+
+
+@inline
+def gradient(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
+    """Gradient at ``(T, alpha)`` alone, world frame, into ``w_new``; the largest over the cables of the Lagrangian's."""
+    cost, mu, rho, kappa, kappa_rate = weights
+    data, T, alpha, g, M, lam = work.data, work.T, work.alpha, work.g, work.M, work.lam
+    pairs, kappa_pair, G = work.pairs, work.kappa_pair, work.w_new
+    xx = xy = xz = yy = yz = zz = 0.0
+    for i in range(n):
+        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        xx += x * x
+        xy += x * y
+        xz += x * z
+        yy += y * y
+        yz += y * z
+        zz += z * z
+        G[3 * i] = 0.0
+        G[3 * i + 1] = 0.0
+        G[3 * i + 2] = 0.0
+    M[0] = xx
+    M[1] = xy
+    M[2] = xz
+    M[3] = yy
+    M[4] = yz
+    M[5] = zz
+    for k in range(m):
+        i = 3 * int(pairs[2 * k])
+        j = 3 * int(pairs[2 * k + 1])
+        primal = kappa_pair[k] / g[LIMITS * n + k]
+        G[i] += primal * alpha[j]
+        G[i + 1] += primal * alpha[j + 1]
+        G[i + 2] += primal * alpha[j + 2]
+        G[j] += primal * alpha[i]
+        G[j + 1] += primal * alpha[i + 1]
+        G[j + 2] += primal * alpha[i + 2]
+    lx, ly, lz = lam[0], lam[1], lam[2]
+    worst = 0.0
+    for i in range(n):
+        d = DATA * i
+        at = LIMITS * i
+        t = T[i]
+        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
+        # Functions of the direction.
+        k3 = kappa_rate / g[at + RATE]
+        ux = G[3 * i] + 2.0 * mu * (xx * x + xy * y + xz * z)
+        uy = G[3 * i + 1] + 2.0 * mu * (xy * x + yy * y + yz * z)
+        uz = G[3 * i + 2] + 2.0 * mu * (xz * x + yz * y + zz * z)
+        ux -= rho * data[d + HOME] + k3 * data[d]
+        uy -= rho * data[d + HOME + 1] + k3 * data[d + 1]
+        uz -= rho * data[d + HOME + 2] + k3 * data[d + 2]
+        # Functions of the force; what lies along the cable first.
+        k2 = kappa / g[at + CONE]
+        along = cost * data[d + OMEGA] * t + kappa / g[at] - kappa / g[at + TENSION_MIN]
+        along += k2 * data[d + COS_CONE]
+        inv = 1.0 / t
+        along -= (ux * x + uy * y + uz * z) * inv
+        ux = ux * inv + along * x
+        uy = uy * inv + along * y
+        uz = uz * inv + along * z + k2
+        if limits > 4:
+            fx = data[d + P] - t * x
+            fy = data[d + P + 1] - t * y
+            fz = data[d + P + 2] - t * z
+            k5 = kappa / g[at + TILT]
+            push = kappa / g[at + THRUST] + k5 * data[d + COS_TILT]
+            push /= math.sqrt(fx * fx + fy * fy + fz * fz)
+            ux -= push * fx
+            uy -= push * fy
+            uz -= push * fz - k5
+        G[3 * i] = ux
+        G[3 * i + 1] = uy
+        G[3 * i + 2] = uz
+        ux += lx
+        uy += ly
+        uz += lz
+        worst = max(worst, ux * ux + uy * uy + uz * uz)
+    return math.sqrt(worst)
 
 
 @inline
@@ -395,6 +478,7 @@ def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
         b0, b1, b2 = rows[o], rows[o + 1], rows[o + 2]
         d0, d1, d2 = rows[o + 3], rows[o + 4], rows[o + 5]
         inverse = 1.0 / rows[o + 17]
+        rows[o + 19] = inverse
         h1, h2 = rows[o + 15] * inverse, rows[o + 16] * inverse
         rt = rows[o + 18]
         c00 = rows[o + 10] - h1 * rows[o + 15] + shift
@@ -486,7 +570,7 @@ def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
     S[71] = rz
     for i in range(n):
         x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
-        inverse = 1.0 / rows[ROW * i + 17]
+        inverse = rows[ROW * i + 19]
         S[45] += x * x * inverse
         S[53] += y * x * inverse
         S[54] += y * y * inverse
@@ -497,14 +581,51 @@ def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
         S[69] -= part * x
         S[70] -= part * y
         S[71] -= part * z
-        k0 = RHS * 2 * i
-        for r in range(2):
-            o = k0 + RHS * r
-            for k in range(8):
-                value = Y[o + k]
-                S[64 + k] -= value * Y[o + 8]
-                for c in range(k + 1):
-                    S[8 * k + c] += value * Y[o + c]
+    # A few sums at a time, as many as fit into registers.
+    a00 = a10 = a11 = a20 = a21 = a22 = a30 = a31 = a32 = a33 = a40 = a41 = a42 = a43 = a44 = 0.0
+    for r in range(0, 2 * RHS * n, RHS):
+        y0, y1, y2, y3, y4 = Y[r], Y[r + 1], Y[r + 2], Y[r + 3], Y[r + 4]
+        a00 += y0 * y0
+        a10 += y1 * y0
+        a11 += y1 * y1
+        a20 += y2 * y0
+        a21 += y2 * y1
+        a22 += y2 * y2
+        a30 += y3 * y0
+        a31 += y3 * y1
+        a32 += y3 * y2
+        a33 += y3 * y3
+        a40 += y4 * y0
+        a41 += y4 * y1
+        a42 += y4 * y2
+        a43 += y4 * y3
+        a44 += y4 * y4
+    S[0] += a00
+    S[8], S[9] = a10, S[9] + a11
+    S[16], S[17], S[18] = a20, a21, S[18] + a22
+    S[24], S[25], S[26], S[27] = a30, a31, a32, S[27] + a33
+    S[32], S[33], S[34], S[35], S[36] = a40, a41, a42, a43, S[36] + a44
+    for k in range(5, 9):
+        a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = 0.0
+        for r in range(0, 2 * RHS * n, RHS):
+            y = Y[r + k]
+            a0 += y * Y[r]
+            a1 += y * Y[r + 1]
+            a2 += y * Y[r + 2]
+            a3 += y * Y[r + 3]
+            a4 += y * Y[r + 4]
+            a5 += y * Y[r + 5]
+            a6 += y * Y[r + 6]
+            a7 += y * Y[r + 7]
+        sign = -1.0 if k == 8 else 1.0
+        S[8 * k] += sign * a0
+        S[8 * k + 1] += sign * a1
+        S[8 * k + 2] += sign * a2
+        S[8 * k + 3] += sign * a3
+        S[8 * k + 4] += sign * a4
+        S[8 * k + 5] += sign * a5
+        S[8 * k + 6] += sign * a6
+        S[8 * k + 7] += sign * a7
 
 
 @inline
@@ -531,15 +652,15 @@ def solve_2x2_disc(a, b, c, x, y, radius):  # type: ignore[no-untyped-def]
 
 
 @inline
-def multiplier(S, bound_h, bound_v):  # type: ignore[no-untyped-def]
+def multiplier(S, bound_h, bound_v, again):  # type: ignore[no-untyped-def]
     """Solve the 8x8 system with the multiplier of the force inside its bounds; into ``S[64:]``.
 
-    Returns whether the bound is active (the force gives way).
+    ``again``: the matrix is eliminated already. Returns whether the bound is active (the force gives way).
     """
     for k in range(5):
-        inverse = 1.0 / S[9 * k]
+        inverse = S[9 * k] if again else 1.0 / S[9 * k]
         S[9 * k] = inverse
-        for r in range(k + 1, 9):
+        for r in range(8 if again else k + 1, 9):
             f = S[8 * r + k] * inverse
             for c in range(k + 1, min(r + 1, 8)):
                 S[8 * r + c] -= f * S[8 * c + k]
@@ -573,9 +694,55 @@ def multiplier(S, bound_h, bound_v):  # type: ignore[no-untyped-def]
 
 
 @inline
+def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
+    """For another step with the same matrix: column ``q`` of ``Y`` and the right-hand side of the 8x8 system.
+
+    From the gradient in ``w_new``, in the frames of the matrix, and ``(rx, ry, rz) = sum w + F``.
+    """
+    first, G = work.first, work.w_new
+    rows, K, Y, S = work.rows, work.K, work.Y, work.S
+    size = 2 * n
+    for k in range(5):
+        S[64 + k] = 0.0
+    S[69] = rx
+    S[70] = ry
+    S[71] = rz
+    for i in range(n):
+        o = ROW * i
+        gx, gy, gz = G[3 * i], G[3 * i + 1], G[3 * i + 2]
+        x, y, z = rows[o + 6], rows[o + 7], rows[o + 8]
+        q1 = rows[o] * gx + rows[o + 1] * gy + rows[o + 2] * gz
+        q2 = rows[o + 3] * gx + rows[o + 4] * gy + rows[o + 5] * gz
+        rt = x * gx + y * gy + z * gz
+        rows[o + 13] = q1
+        rows[o + 14] = q2
+        rows[o + 18] = rt
+        part = rt * rows[o + 19]
+        S[69] -= part * x
+        S[70] -= part * y
+        S[71] -= part * z
+        y0 = q1 - rows[o + 15] * part
+        y1 = q2 - rows[o + 16] * part
+        top = size * 2 * i
+        low = top + size
+        for j in range(int(first[i]), i):
+            v0, v1 = Y[RHS * 2 * j + 8], Y[RHS * (2 * j + 1) + 8]
+            y0 -= K[top + 2 * j] * v0 + K[top + 2 * j + 1] * v1
+            y1 -= K[low + 2 * j] * v0 + K[low + 2 * j + 1] * v1
+        y0 *= K[top + 2 * i]
+        y1 = (y1 - K[low + 2 * i] * y0) * K[low + 2 * i + 1]
+        k0 = RHS * 2 * i
+        k1 = k0 + RHS
+        Y[k0 + 8] = y0
+        Y[k1 + 8] = y1
+        for k in range(8):
+            S[64 + k] -= Y[k0 + k] * y0 + Y[k1 + k] * y1
+
+
+@inline
 def back_substitute(n, work):  # type: ignore[no-untyped-def]
-    """``dw`` of every cable from the solution in ``S[64:]``."""
-    alpha, first, dw = work.alpha, work.first, work.dw
+    """``dw`` of every cable from the solution in ``S[64:]``; the largest component of the Lagrangian's gradient before it."""
+    first, dw = work.first, work.dw
     rows, K, Y, S = work.rows, work.K, work.Y, work.S
     size = 2 * n
     for r in range(2 * n):
@@ -585,6 +752,7 @@ def back_substitute(n, work):  # type: ignore[no-untyped-def]
             value += Y[o + k] * S[64 + k]
         Y[o + 8] = -value
     lx, ly, lz = S[69], S[70], S[71]
+    worst = 0.0
     for i in range(n - 1, -1, -1):
         top = size * 2 * i
         low = top + size
@@ -596,12 +764,16 @@ def back_substitute(n, work):  # type: ignore[no-untyped-def]
             Y[RHS * 2 * j + 8] -= K[top + 2 * j] * eta1 + K[low + 2 * j] * eta2
             Y[RHS * (2 * j + 1) + 8] -= K[top + 2 * j + 1] * eta1 + K[low + 2 * j + 1] * eta2
         o = ROW * i
-        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
-        tau = -(rows[o + 18] + lx * x + ly * y + lz * z)
-        tau = (tau - rows[o + 15] * eta1 - rows[o + 16] * eta2) / rows[o + 17]
+        x, y, z = rows[o + 6], rows[o + 7], rows[o + 8]
+        rt = rows[o + 18] + lx * x + ly * y + lz * z
+        r1 = rows[o + 13] + lx * rows[o] + ly * rows[o + 1] + lz * rows[o + 2]
+        r2 = rows[o + 14] + lx * rows[o + 3] + ly * rows[o + 4] + lz * rows[o + 5]
+        worst = max(worst, rt * rt + r1 * r1 + r2 * r2)
+        tau = -(rt + rows[o + 15] * eta1 + rows[o + 16] * eta2) * rows[o + 19]
         dx = tau * x + rows[o] * eta1 + rows[o + 3] * eta2
         dy = tau * y + rows[o + 1] * eta1 + rows[o + 4] * eta2
         dz = tau * z + rows[o + 2] * eta1 + rows[o + 5] * eta2
         dw[3 * i] = dx
         dw[3 * i + 1] = dy
         dw[3 * i + 2] = dz
+    return math.sqrt(worst)

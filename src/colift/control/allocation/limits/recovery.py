@@ -35,13 +35,26 @@ ROUNDING = 1e-12
 
 
 @inline
+def window(n, cosine, alpha):  # type: ignore[no-untyped-def]
+    """Along x, how far apart two directions with this or a larger cosine can be; 4, all, where they are not in order."""
+    for i in range(1, n):
+        if alpha[3 * i] < alpha[3 * i - 3]:
+            return 4.0
+    return math.sqrt(max(2.0 - 2.0 * cosine, 0.0)) + 1e-6
+
+
+@inline
 def is_broken(n, cos_angle, cos_cone, margin, alpha):  # type: ignore[no-untyped-def]
     """Whether any pair or any cable's place in the cone has no more than a margin (cosine)."""
+    wide = window(n, cos_angle - margin, alpha)
+    begin = 0
     for i in range(n):
         x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
         if not -z - cos_cone > margin:
             return True
-        for j in range(i):
+        while x - alpha[3 * begin] > wide:
+            begin += 1
+        for j in range(begin, i):
             c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
             if not cos_angle - c > margin:
                 return True
