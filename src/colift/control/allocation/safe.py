@@ -129,8 +129,10 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     if W > 1e-6 and not relaxed:
         follow = period / (params[P.turning] + period)
         cycle.turn_home(n, fx, fy, fz, W, follow, cycle.TURN * delta, facing, work)
-    reach = max(params[P.reach], 2.0 * delta)
-    m = cycle.near_pairs(n, params[P.min_angle], reach, params[P.kappa_pair], start, work)
+    edge = params[P.cos_edge]
+    if 2.0 * delta > params[P.reach]:
+        edge = math.cos(min(params[P.min_angle] + 2.0 * delta, math.pi))
+    m = cycle.near_pairs(n, params[P.cos_angle], edge, params[P.kappa_pair], start, work)
     heavy = max(1.0, abs(fz) / n)
     leaning = 0.0
     if yielded[0] > 0.0:
@@ -327,6 +329,8 @@ class Safe(AllocatorPart):
         n = team.n
         limited = self.max_thrust is not None or self.max_tilt_deg is not None
         weights = self._relative_weights(n)
+        least, reach = math.radians(self.min_angle_deg), self._reach(n)
+        cone, tilt = math.radians(self.max_cone_deg), math.radians(self.max_tilt_deg or 89.0)
         return cycle.PARAMS.pack(
             n,
             mu=self.mu,
@@ -336,8 +340,8 @@ class Safe(AllocatorPart):
             kappa=self.barrier,
             kappa_rate=RATE_BARRIER,
             kappa_pair=self.spread,
-            min_angle=math.radians(self.min_angle_deg),
-            reach=self._reach(n),
+            min_angle=least,
+            reach=reach,
             max_rate=self.max_rate,
             settling=self.settling,
             turning=self.turning,
@@ -346,8 +350,13 @@ class Safe(AllocatorPart):
             iterations=self.max_iterations,
             limits=newton.LIMITS if limited else newton.TILT - 1,
             g=team.gravity,
-            cone=math.radians(self.max_cone_deg),
-            tilt=math.radians(self.max_tilt_deg or 89.0),
+            cone=cone,
+            tilt=tilt,
+            cos_angle=math.cos(least),
+            cos_edge=math.cos(min(least + reach, math.pi)),
+            cos_cone=math.cos(cone),
+            cos_tilt=math.cos(tilt),
+            tan_lean=math.tan(cycle.LEVEL * tilt),
             total=float(np.sum(self.tension_caps(n))),
             equal=bool(np.all(weights == 1.0)),
             weight=weights,

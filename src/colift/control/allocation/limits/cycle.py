@@ -25,12 +25,14 @@ PARAMS = Layout(
         "mu": 1, "mu_scaled": 1, "mu_force": 1, "sigma": 1, "kappa": 1, "kappa_rate": 1,
         "kappa_pair": 1, "min_angle": 1, "reach": 1, "max_rate": 1, "settling": 1, "turning": 1,
         "price": 1, "tolerance": 1, "iterations": 1, "limits": 1, "g": 1, "cone": 1, "tilt": 1,
-        "total": 1, "equal": 1,
+        "total": 1, "equal": 1, "cos_angle": 1, "cos_edge": 1, "cos_cone": 1, "cos_tilt": 1, "tan_lean": 1,
     },
     drone={"weight": 1, "T_min": 1, "T_max": 1, "m": 1, "f_max": 1},
 )  # fmt: skip
-"""Tensions and the largest thrust in N."""
+"""Tensions and the largest thrust in N. ``cos_edge`` is that of ``min_angle + reach``, ``tan_lean`` of ``LEVEL`` of the tilt."""
 P = PARAMS.at
+LEVEL = 0.8
+"""Part of the largest tilt that a drone needs at most for itself."""
 
 MAX_TURN = 0.5
 """Largest turn of a direction in one cycle, rad, however long the cycle."""
@@ -163,7 +165,7 @@ def set_up(  # type: ignore[no-untyped-def]
     """Limits of every cable in this cycle and a strictly feasible ``w``; whether one was relaxed."""
     data, T, alpha, w = work.data, work.T, work.alpha, work.w
     vers = 2.0 * math.sin(0.5 * delta) ** 2
-    cos_cone = math.cos(params[P.cone])
+    cos_cone = params[P.cos_cone]
     for i in range(n):
         at = int(order[i])
         x, y, z = directions[at, 0], directions[at, 1], directions[at, 2]
@@ -177,7 +179,7 @@ def set_up(  # type: ignore[no-untyped-def]
     for k in range(3 * n):
         alpha[k] = start[k]
     relaxed = False
-    if recovery.is_broken(n, math.cos(params[P.min_angle]), cos_cone, recovery.SURE, start):
+    if recovery.is_broken(n, params[P.cos_angle], cos_cone, recovery.SURE, start):
         relaxed = True
         recovery.lead_back(n, params[P.min_angle], params[P.cone], delta, start, alpha)
     for i in range(n):
@@ -204,13 +206,14 @@ def set_up(  # type: ignore[no-untyped-def]
         low += room
         t = max(min(t, high - room), low)
         if params[P.limits] > 4.0:
-            cos_tilt = math.cos(params[P.tilt])
+            cos_tilt = params[P.cos_tilt]
             drone_limits(
                 d,
                 params[p + P.m] * unit,
                 params[p + P.f_max] * unit,
                 params[P.g],
-                params[P.tilt],
+                cos_tilt,
+                params[P.tan_lean],
                 acceleration,
                 data,
             )
@@ -239,11 +242,11 @@ def set_up(  # type: ignore[no-untyped-def]
 def breaks_a_limit(n, order, unit, params, work):  # type: ignore[no-untyped-def]
     """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
     data, T, alpha = work.data, work.T, work.alpha
-    cos_angle, cos_cone = math.cos(params[P.min_angle]), math.cos(params[P.cone])
+    cos_angle, cos_cone = params[P.cos_angle], params[P.cos_cone]
     if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, alpha):
         return True
     if params[P.limits] > 4.0:
-        cos_tilt = math.cos(params[P.tilt])
+        cos_tilt = params[P.cos_tilt]
         for i in range(n):
             d = newton.DATA * i
             x = data[d + OWN] - T[i] * alpha[3 * i]
@@ -259,7 +262,7 @@ def breaks_a_limit(n, order, unit, params, work):  # type: ignore[no-untyped-def
 
 
 @inline
-def drone_limits(d, mass, thrust, gravity, tilt, acceleration, data):  # type: ignore[no-untyped-def]
+def drone_limits(d, mass, thrust, gravity, cos_tilt, tan_lean, acceleration, data):  # type: ignore[no-untyped-def]
     """The thrust ``p`` that a drone needs for itself, brought within what it can do, and its limits.
 
     An acceleration that the drone cannot follow even without a cable gives way here.
@@ -271,7 +274,7 @@ def drone_limits(d, mass, thrust, gravity, tilt, acceleration, data):  # type: i
     y = mass * ay
     z = min(max(mass * (az + gravity), 0.3 * mass * gravity), 0.8 * thrust)
     level = math.sqrt(x * x + y * y)
-    most = z * math.tan(0.8 * tilt)
+    most = z * tan_lean
     if level > most:
         x *= most / level
         y *= most / level
@@ -281,20 +284,20 @@ def drone_limits(d, mass, thrust, gravity, tilt, acceleration, data):  # type: i
     data[d + OWN + 1] = y * scale
     data[d + OWN + 2] = z * scale
     data[d + F_MAX] = thrust
-    data[d + COS_TILT] = math.cos(tilt)
+    data[d + COS_TILT] = cos_tilt
 
 
 @inline
-def near_pairs(n, min_angle, reach, kappa, start, work):  # type: ignore[no-untyped-def]
-    """List the pairs ``(i, j)``, ``j < i``, closer than ``min_angle + reach``; their number.
+def near_pairs(n, limit, edge, kappa, start, work):  # type: ignore[no-untyped-def]
+    """List the pairs ``(i, j)``, ``j < i``, closer than where the cosine is ``edge``; their number.
+
+    ``limit`` is that of the least angle.
 
     ``first[i]`` becomes the first neighbour of cable i: the envelope of the sparse matrix. A pair that
     is too close may not come closer than half of the way that recovery gained.
     """
     alpha, pairs, first = work.alpha, work.pairs, work.first
     kappa_pair, cos_max = work.kappa_pair, work.cos_max
-    limit = math.cos(min_angle)
-    edge = math.cos(min(min_angle + reach, math.pi))
     scale = 1.0 / (limit - edge)
     wide = recovery.window(n, edge, alpha)
     m = 0
@@ -425,9 +428,9 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
         weights = newton.Weights(cost, mu_now, rho_now, kappa_now, rate_now)
         settled = held and not yielding and not fresh and iterations > 0
         # How much a step with the same matrix leaves: of barriers as of the change of their limits.
-        left = DRIFT * drift
+        left = min(DRIFT * drift, 1.0)
         # A full step leaves what it began with times that change, nearly.
-        if settled and (again or origin * drift * min(left, 1.0) <= tolerance):
+        if settled and (again or origin * drift * left <= tolerance):
             known = True
             residual = newton.gradient(n, limits, m, weights, work)
             if residual <= tolerance:
@@ -435,9 +438,10 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
                 break
             if iterations >= max_iterations:
                 break
-            if again:
-                left = residual / origin
-            again = attempts == 0 and s == 1.0 and residual * left <= tolerance
+            good = (
+                residual * residual <= tolerance * origin if again else residual * left <= tolerance
+            )
+            again = good and attempts == 0 and s == 1.0
         else:
             known = again = False
         if not again:
