@@ -10,6 +10,7 @@ from pydantic import Field
 
 from colift.control.reference.base import SIGNATURE, ReferencePart
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
 from colift.part import Vector
 from colift.team import Team
 
@@ -22,21 +23,27 @@ _DURATIONS = np.geomspace(0.5, 600.0, 96)
 _SAMPLES = np.linspace(0.0, 1.0, 33)
 
 
+DEGREE = 7
+PARAMS = Layout(team={"begin": 1, "duration": 1, "coefficients": 3 * (DEGREE + 1)})
+"""``coefficients`` of each axis, in time over duration, the constant first."""
+P = PARAMS.at
+
+
 @kernel(SIGNATURE)
 def _guided(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     t = now.time
     reference = writes.reference
-    duration = params[1]
-    elapsed = max(t - params[0], 0.0)
+    duration = params[P.duration]
+    elapsed = max(t - params[P.begin], 0.0)
     s = min(elapsed / duration, 1.0)
     for k in range(3):
         value, first, second, third = 0.0, 0.0, 0.0, 0.0
-        for power in range(7, -1, -1):
+        for power in range(DEGREE, -1, -1):
             # Horner's scheme for the polynomial and its derivatives over their factorials.
             third = third * s + second
             second = second * s + first
             first = first * s + value
-            value = value * s + params[2 + 8 * k + power]
+            value = value * s + params[P.coefficients + (DEGREE + 1) * k + power]
         reference[0, k] = value
         reference[1, k] = first / duration
         reference[2, k] = 2.0 * second / (duration * duration)
@@ -98,9 +105,11 @@ class Guided(ReferencePart):
             excess = np.maximum(excess, peaks / max(most, 1.001 * given) - 1.0)
         # The shortest within the limits; where there is none, the nearest to them.
         best = int(np.argmax(excess <= 0.0)) if (excess <= 0.0).any() else int(np.argmin(excess))
-        coefficients = np.zeros((3, 8))
+        coefficients = np.zeros((3, DEGREE + 1))
         coefficients[:, : degree + 1] = polynomials[best].T
-        return np.concatenate([[self.begin, _DURATIONS[best]], coefficients.ravel()])
+        return PARAMS.pack(
+            team.n, begin=self.begin, duration=_DURATIONS[best], coefficients=coefficients.ravel()
+        )
 
 
 def _rows(s: Vector, derivative: int, degree: int) -> NDArray[np.float64]:

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math.columns import column
 from colift.part import Places, Vector
 from colift.team import Team
 from colift.world.plant._bodies import (
@@ -40,9 +42,14 @@ from colift.world.plant._bodies import (
 from colift.world.plant.base import STEP_SIGNATURE, Start
 
 BEAD = 6
-CABLE = 5
-"""Parameters per cable, after those of the bodies: stiffness of a segment, its damping by its own rate and by the mean
-rate of its cable's segments, bead mass, drag."""
+CABLES = Layout(drone={"stiffness": 1, "damping": 1, "together": 1, "bead_mass": 1, "drag": 1})
+"""Parameters of each cable, after those of the bodies: stiffness of a segment, its damping by its own rate and (``together``)
+by the mean rate of its cable's segments."""
+C = CABLES.at
+CABLE: int = C.width
+SCRATCH = Layout(drone={"T": 1, "parting": 1})
+"""In columns, behind the state and three of its size for the integrator."""
+SPANS = SCRATCH.spans
 COURANT = 1.5
 """Substep times the fastest rate; the integrator is stable to 2.6 at least."""
 MILD = 0.5
@@ -72,8 +79,9 @@ def derivative(n, k, y, thrusts, torques, external, attached, longest, params, T
     wind = cables + CABLE * n
     for i in range(n):
         c = cables + CABLE * i
-        stiffness, damping, together = params[c], params[c + 1], params[c + 2]
-        bead_mass, drag = params[c + 3], params[c + 4]
+        stiffness, damping = params[c + C.stiffness], params[c + C.damping]
+        together, bead_mass = params[c + C.together], params[c + C.bead_mass]
+        drag = params[c + C.drag]
         length = params[MASS + BODY * i + 1] / (k + 1)
         for j in range(k):
             o = beads + BEAD * (k * i + j)
@@ -174,8 +182,8 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     begin = memory[size : 2 * size]
     total = memory[2 * size : 3 * size]
     slope = memory[3 * size : 4 * size]
-    T = memory[4 * size : 4 * size + n]
-    parting = memory[4 * size + n : 4 * size + 2 * n]
+    T = column(memory, 4 * size, n, SPANS.T)
+    parting = column(memory, 4 * size, n, SPANS.parting)
     substeps = math.ceil(dt / longest)
     h = dt / substeps
     for substep in range(substeps):
@@ -227,7 +235,7 @@ class ChainPart(BodiesPart):
         return (0.0, 0.0, 0.0)
 
     def _cables(self, team: Team) -> tuple[Team, NDArray[np.float64], float]:
-        """The team with the ends' share of the cables' mass, parameters (n, 5) of the cables, longest substep."""
+        """The team with the ends' share of the cables' mass, parameters of the cables, longest substep."""
         k, n = self.bead_count, team.n
         share = self.line_density * team.cable_lengths / (k + 1)
         loaded = Team(
@@ -251,19 +259,20 @@ class ChainPart(BodiesPart):
             )
         fastest = np.sqrt((stiffness * ends).max(axis=0))
         own = np.minimum(delay, 1.0 / fastest)
-        drag = np.full(n, self.line_drag)
-        cables = np.column_stack(
-            [stiffness, stiffness * own, stiffness * (delay - own), share, drag]
-        )
+        cables = CABLES.pack(
+            n, stiffness=stiffness, damping=stiffness * own, together=stiffness * (delay - own),
+            bead_mass=share, drag=self.line_drag,
+        )  # fmt: skip
         return loaded, cables, COURANT / float(fastest.max())
 
     def params(self, team: Team) -> Vector:
         loaded, cables, longest = self._cables(team)
         tail = [*self.wind, longest, float(self.bead_count)]
-        return np.concatenate([super().params(loaded), cables.ravel(), tail])
+        return np.concatenate([super().params(loaded), cables, tail])
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * (state_size(team.n) + BEAD * self.bead_count * team.n) + 2 * team.n)
+        size = state_size(team.n) + BEAD * self.bead_count * team.n
+        return np.zeros(4 * size + SCRATCH.size(team.n))
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(team.cable_lengths * (1.0 + tensions / self.stiffness))
@@ -305,4 +314,4 @@ class ChainPart(BodiesPart):
 
 def _team_size(memory: Vector, width: int) -> int:
     """Drones whose memory this is, with ``width`` numbers for the beads of each."""
-    return (memory.size - 4 * LOAD) // (4 * (DRONE + width) + 2)
+    return (memory.size - 4 * LOAD) // (4 * (DRONE + width) + SCRATCH.size(1))

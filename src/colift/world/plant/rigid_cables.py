@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import (
@@ -21,6 +23,10 @@ from colift.world.plant._bodies import (
 )
 from colift.world.plant._rigid import derivative, project
 from colift.world.plant.base import STEP_SIGNATURE
+
+SCRATCH = Layout(drone={"T": 1, "b": 1, "alpha": 3})
+"""In columns, behind the state and three of its size for the integrator."""
+SPANS = SCRATCH.spans
 
 
 @kernel(STEP_SIGNATURE)
@@ -35,9 +41,9 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     begin = memory[size : 2 * size]
     total = memory[2 * size : 3 * size]
     slope = memory[3 * size : 4 * size]
-    T = memory[4 * size : 4 * size + n]
-    b = memory[4 * size + n : 4 * size + 2 * n]
-    alpha = memory[4 * size + 2 * n : 4 * size + 5 * n]
+    T = column(memory, 4 * size, n, SPANS.T)
+    b = column(memory, 4 * size, n, SPANS.b)
+    alpha = column(memory, 4 * size, n, SPANS.alpha)
     for k in range(size):
         begin[k] = y[k]
     for stage in range(4):
@@ -59,4 +65,4 @@ class RigidCables(BodiesPart):
     kernel = _step
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * state_size(team.n) + 5 * team.n)
+        return np.zeros(4 * state_size(team.n) + SCRATCH.size(team.n))

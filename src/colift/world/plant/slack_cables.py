@@ -15,6 +15,8 @@ import math
 import numpy as np
 
 from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import (
@@ -50,6 +52,10 @@ NEAR = 1e-11
 """Missing length that counts as none, m."""
 SLOW = 1e-5
 """Speed along the cable that counts as none, m/s: what one catch throws off another bounces ever faster."""
+
+SCRATCH = Layout(drone={"T": 1, "b": 1, "taut": 1, "held": 1, "alpha": 3, "parting": 1})
+"""In columns, behind the state and three of its size for the integrator; behind the ``parting`` speeds the time since a catch."""
+S, SPANS = SCRATCH.at, SCRATCH.spans
 
 
 @inline
@@ -151,9 +157,9 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     begin = memory[size : 2 * size]
     total = memory[2 * size : 3 * size]
     slope = memory[3 * size : 4 * size]
-    rest = memory[4 * size :]
-    T, b, taut, held = rest[:n], rest[n : 2 * n], rest[2 * n : 3 * n], rest[3 * n : 4 * n]
-    alpha, parting = rest[4 * n : 7 * n], rest[7 * n :]
+    T, b = column(memory, 4 * size, n, SPANS.T), column(memory, 4 * size, n, SPANS.b)
+    taut, held = column(memory, 4 * size, n, SPANS.taut), column(memory, 4 * size, n, SPANS.held)
+    alpha, parting = column(memory, 4 * size, n, SPANS.alpha), memory[4 * size + n * S.parting :]
     note_parting(n, y, dt, parting)
     left = dt
     for event in range(EVENTS * n + 1):
@@ -210,4 +216,4 @@ class SlackCables(BodiesPart):
     kernel = _step
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * state_size(team.n) + 8 * team.n + 1)
+        return np.zeros(4 * state_size(team.n) + SCRATCH.size(team.n) + 1)
