@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import datetime
 from functools import cache
@@ -59,7 +59,11 @@ def __getattr__(name: str) -> Console:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
+MissionName = Annotated[
+    str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+JsonFile = Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")]
 Sets = Annotated[
     list[str] | None,
     typer.Option(
@@ -72,6 +76,19 @@ With = Annotated[
     list[Path] | None,
     typer.Option("--with", metavar="FILE", help="Python file with parts of your own to use."),
 ]
+
+
+def result_folder(name: str) -> Any:
+    """The option ``--out`` of a command that makes ``runs/NAME-DATE-TIME`` where it is left out."""
+    return typer.Option("--out", help="Result folder.", show_default=f"runs/{name}-DATE-TIME")
+
+
+def load_parts(files: Iterable[Path] | None) -> None:
+    """Register the parts of a user's files."""
+    from colift.part import load_file
+
+    for path in files or ():
+        load_file(path)
 
 
 def save_json(file: Path | None, result: Any) -> None:
@@ -158,6 +175,19 @@ def numbers(text: str, least: int, most: int) -> list[int]:
     return found
 
 
+def several(text: str | None) -> list[str]:
+    """A list of names, separated by commas."""
+    return [name.strip() for name in text.split(",")] if text else []
+
+
+def show_files(files: Mapping[str, Path]) -> None:
+    """Say what was written where."""
+    from rich.markup import escape
+
+    for name, path in files.items():
+        console().print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+
+
 def show_tables(tables: Iterable[tuple[str, list[str], list[list[str]]]]) -> None:
     """Print titled tables of text; the first and the last column may wrap, a unit goes below its name."""
     from rich.box import SIMPLE_HEAD
@@ -203,11 +233,13 @@ def end_with(verdict: Verdict) -> None:
 
 
 def plain(value: Any) -> Any:
-    """JSON-ready copy; a number that is not finite becomes null."""
+    """JSON-ready copy; a number that is not finite becomes null, a path its text."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

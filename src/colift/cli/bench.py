@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from colift.cli.base import (
     Json,
+    JsonFile,
     app,
     emit,
     loading,
@@ -33,7 +33,7 @@ def bench(
     instructions: Annotated[
         bool, typer.Option(help="Count the instructions of a call as well (needs valgrind).")
     ] = False,
-    file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
+    file: JsonFile = None,
     as_json: Json = False,
 ) -> None:
     """Time every solver that is installed on the same problems, and judge every answer alike.

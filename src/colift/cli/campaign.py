@@ -22,6 +22,7 @@ from colift.cli.base import (
     check_out,
     err,
     out,
+    show_files,
 )
 
 if TYPE_CHECKING:
@@ -191,6 +192,13 @@ def end(rows: Sequence[dict[str, Any]], strict: bool) -> None:
         raise typer.Exit(EXIT_FAILED)
 
 
+def told(outcome: Outcome) -> dict[str, Any]:
+    """What was flown now, for JSON."""
+    return {
+        "flown": outcome.flown, "wall_time_s": outcome.wall_time, "workers": outcome.workers
+    }  # fmt: skip
+
+
 def show_end(outcome: Outcome, files: dict[str, Path]) -> None:
     """Say what was flown now, what failed and where everything is."""
     there = len({row["key"] for row in outcome.rows}) - outcome.flown
@@ -207,5 +215,4 @@ def show_end(outcome: Outcome, files: dict[str, Path]) -> None:
         out.print(f"[red]failed[/red]: {escape(row['error'])}", highlight=False, soft_wrap=True)
     if len(failed) > 5:
         out.print(f"... and {len(failed) - 5} more; --retry-failed flies them again.")
-    for name, path in files.items():
-        out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+    show_files(files)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -17,7 +18,9 @@ from colift.cli.base import (
     loading,
     new_folder,
     out,
+    result_folder,
     save_json,
+    several,
     show_tables,
 )
 from colift.cli.campaign import (
@@ -38,38 +41,40 @@ from colift.cli.campaign import (
     in_order,
     say_refused,
     show_end,
+    told,
 )
+
+Allocators = Annotated[
+    str | None,
+    typer.Option(metavar="A,B,...", help="Who takes part.", show_default="all installed"),
+]
+Missions = Annotated[
+    str | None,
+    typer.Option(metavar="M,N,...", help="Missions.", show_default="five of the shipped"),
+]
+Quick = Annotated[bool, typer.Option(help="Two missions of 4 s, one seed; a first look.")]
+Spread = Annotated[
+    bool, typer.Option(help="Sweep what each allocator spends on separation as well.")
+]
+AsInMission = Annotated[
+    bool,
+    typer.Option(
+        "--as-in-mission", help="The allocator that a mission names keeps its settings there."
+    ),
+]
 
 
 @app.command()
 def compare(
-    allocators: Annotated[
-        str | None,
-        typer.Option(metavar="A,B,...", help="Who takes part.", show_default="all installed"),
-    ] = None,
-    missions: Annotated[
-        str | None,
-        typer.Option(metavar="M,N,...", help="Missions.", show_default="five of the shipped"),
-    ] = None,
+    allocators: Allocators = None,
+    missions: Missions = None,
     seeds: Seeds = 3,
     first_seed: FirstSeed = 0,
-    quick: Annotated[
-        bool, typer.Option(help="Two missions of 4 s, one seed; a first look.")
-    ] = False,
-    spread: Annotated[
-        bool, typer.Option(help="Sweep what each allocator spends on separation as well.")
-    ] = True,
-    as_in_mission: Annotated[
-        bool,
-        typer.Option(
-            "--as-in-mission", help="The allocator that a mission names keeps its settings there."
-        ),
-    ] = False,
+    quick: Quick = False,
+    spread: Spread = True,
+    as_in_mission: AsInMission = False,
     sets: Sets = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Result folder.", show_default="runs/compare-DATE-TIME"),
-    ] = None,
+    folder: Annotated[Path | None, result_folder("compare")] = None,
     extra: With = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -95,18 +100,15 @@ def compare(
 
     with loading():
         from colift.study import compare as study
-        from colift.study.campaign import judge
         from colift.study.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
         own = study.own_allocators(sources)
-        able, missing = study.contestants(allocators and allocators.split(","), own)
+        able, missing = study.contestants(several(allocators) or None, own)
         changes = parse_overrides(sets)
         if quick:
             seeds, changes = 1, {"timing.duration": 4.0, **changes}
-        chosen = (
-            missions.split(",") if missions else study.QUICK_MISSIONS if quick else study.MISSIONS
-        )
+        chosen = several(missions) or (study.QUICK_MISSIONS if quick else study.MISSIONS)
         flown_seeds = range(first_seed, first_seed + seeds)
         cases = study.cases(
             able, chosen, flown_seeds, changes, spread=spread, as_in_mission=as_in_mission
@@ -118,19 +120,36 @@ def compare(
         "Comparing", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
-    from colift.kernel.math.shares import interval
-    from colift.show.report.campaign import contest_table, write_contest
-
     rows = in_order(cases, outcome.rows, refused)
-    contest = [row for row in rows if row["study"] == study.CONTEST]
-    field = judge.contestants(contest)
-    said = judge.words(field, judge.criteria_of(contest))
     notes = study.protocol(chosen, flown_seeds, changes, as_in_mission=as_in_mission)
-    files = {
-        "report": write_contest(rows, target, said, command=command_line(), notes=notes),
-        "results": target / FILE,
-    }
     result = {
+        **_judge(rows, target, notes),
+        "missions": list(chosen), "seeds": seeds, "first_seed": first_seed, "protocol": notes,
+        "period_s": changes.get("timing.allocation", study.PERIOD), "not_installed": missing,
+        **told(outcome),
+    }  # fmt: skip
+    save_json(target / "compare.json", result)
+    export(rows, csv, parquet)
+    if as_json:
+        emit(result)
+    else:
+        _say(rows, result)
+        show_end(outcome, result["files"])
+    end(rows, strict)
+
+
+def _judge(rows: Sequence[dict[str, Any]], target: Path, notes: Sequence[str]) -> dict[str, Any]:
+    """Who is best at what; the page that says so is written."""
+    from colift.kernel.math.shares import interval
+    from colift.show.report.campaign import write_contest
+    from colift.study.campaign import judge
+    from colift.study.compare import CONTEST
+
+    contest = [row for row in rows if row["study"] == CONTEST]
+    field = judge.contestants(contest)
+    words = judge.words(field, judge.criteria_of(contest))
+    page = write_contest(rows, target, words, command=command_line(), notes=notes)
+    return {
         "allocators": {
             c.name: {
                 "flights": c.flights, "held": c.held, "interval": interval(c.held, c.flights),
@@ -139,31 +158,23 @@ def compare(
             }
             for c in field
         },
-        "missions": list(chosen),
-        "seeds": seeds,
-        "first_seed": first_seed,
-        "protocol": notes,
-        "period_s": changes.get("timing.allocation", study.PERIOD),
-        "words": said,
-        "not_installed": missing,
-        "flown": outcome.flown,
-        "wall_time_s": outcome.wall_time,
-        "workers": outcome.workers,
-        "files": {name: str(path) for name, path in files.items()},
+        "words": words,
+        "files": {"report": page, "results": target / FILE},
     }  # fmt: skip
-    save_json(target / "compare.json", result)
-    export(rows, csv, parquet)
-    if as_json:
-        emit(result)
-    else:
-        criteria = judge.criteria_of(contest)
-        show_tables(
-            (title, *contest_table(contest, [c for c in criteria if c.group == title]))
-            for title in judge.GROUPS
-        )
-        for sentence in said:
-            out.print(f"- {escape(sentence)}", highlight=False)
-        for sentence in missing:
-            out.print(f"Not compared: {escape(sentence)}", highlight=False)
-        show_end(outcome, files)
-    end(rows, strict)
+
+
+def _say(rows: Sequence[dict[str, Any]], result: dict[str, Any]) -> None:
+    from colift.show.report.campaign import contest_table
+    from colift.study.campaign import judge
+    from colift.study.compare import CONTEST
+
+    contest = [row for row in rows if row["study"] == CONTEST]
+    criteria = judge.criteria_of(contest)
+    show_tables(
+        (title, *contest_table(contest, [c for c in criteria if c.group == title]))
+        for title in judge.GROUPS
+    )
+    for sentence in result["words"]:
+        out.print(f"- {escape(sentence)}", highlight=False)
+    for sentence in result["not_installed"]:
+        out.print(f"Not compared: {escape(sentence)}", highlight=False)

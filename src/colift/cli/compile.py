@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from colift.cli.base import Json, With, app, console, emit
+from colift.cli.base import Json, With, app, console, emit, load_parts
 
 
 @app.command(name="compile")
@@ -31,10 +31,8 @@ def compile_(
       colift compile paper-spiral --allocator safe
     """
     from colift.flight.compilation import warm
-    from colift.part import load_file
 
-    for path in extra or []:
-        load_file(path)
+    load_parts(extra)
     where = console(stderr=True)
     if where.is_terminal:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

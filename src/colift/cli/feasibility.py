@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import typer
 from rich.markup import escape
 
-from colift.cli.base import EXIT_ERROR, Json, Sets, app, emit, loading, out, show_warnings
+from colift.cli.base import (
+    EXIT_ERROR,
+    Json,
+    MissionName,
+    Sets,
+    app,
+    emit,
+    loading,
+    out,
+    show_warnings,
+)
 from colift.errors import ColiftError
+
+if TYPE_CHECKING:
+    from colift.control.allocation.limits.feasibility import Feasibility
+    from colift.control.allocation.safe import Safe
+    from colift.mission.mission import Mission
 
 
 @app.command()
 def feasibility(
-    mission: Annotated[
-        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
-    ],
+    mission: MissionName,
     sets: Sets = None,
     as_json: Json = False,
 ) -> None:
@@ -29,10 +43,7 @@ def feasibility(
     from colift.mission.load import parse_overrides
 
     with loading():
-        import numpy as np
-
         import colift
-        from colift.control.allocation.limits.feasibility import SEARCHED
         from colift.control.allocation.limits.feasibility import feasibility as judge
         from colift.control.allocation.safe import Safe
         from colift.mission.warnings import warnings_of
@@ -52,59 +63,75 @@ def feasibility(
     conflicts = [*found.conflicts, *loaded.attitude_control.diverges(loaded)]
     if not found.conflicts and (message := part.cannot_start(team, loaded.start_directions())):
         conflicts.append(message)
-    weight = team.load_mass * team.gravity
-    widest = math.degrees(found.widest_angle)
-    winds = [
-        f"disturbance.{i} ({kind})"
-        for i, (kind, each) in enumerate(
-            zip(loaded.list_kinds["disturbance"], loaded.disturbance, strict=True)
-        )
-        if each.makes_wind
-    ]
-    wind = f"in calm air: the wind of {', '.join(winds)} is not counted" if winds else ""
     if as_json:
-        emit(
-            {
-                "mission": loaded.name, "feasible": not conflicts, "conflicts": conflicts,
-                "weight_N": weight, "lightest_N": found.lightest, "heaviest_N": found.heaviest,
-                "margin": found.margin, "binding": [asdict(each) for each in found.binding],
-                "widest_angle_deg": widest,
-                "most_cables_found": found.most_cables[0], "most_cables_bound": found.most_cables[1],
-                "tensions_N": found.tensions.tolist(), "thrusts_N": found.thrusts.tolist(),
-                "thrust_limits_N": found.thrust_limits.tolist(), "wind": wind, "warnings": warnings,
-            }
-        )  # fmt: skip
+        _emit(loaded, found, conflicts, warnings)
     else:
-        n = team.n
-        most, bound = found.most_cables
-        allowed = f"{most} cables (found; never more than {bound})"
-        if most >= SEARCHED:
-            allowed = f"{most} cables or more"
-        out.print(
-            f"{escape(loaded.name)}: {n} drones, load of {weight:.4g} N, hover {wind}".rstrip()
-        )
-        out.print(
-            f"Within the limits the cables hold {found.lightest:.4g} to {found.heaviest:.4g} N: "
-            f"{found.margin:.2f} times the load."
-        )
-        for each in found.binding:
-            out.print(f"  binding: {escape(str(each))}", highlight=False)
-        spare = found.thrust_limits / found.thrusts
-        i = int(np.argmin(spare))
-        if math.isfinite(spare[i]):
-            out.print(
-                f"In the allocator's formation drone {i} needs {found.thrusts[i]:.4g} N of thrust, the most "
-                f"for what it has: {found.thrust_limits[i]:.4g} N."
-            )
-        else:
-            out.print("Nothing limits the drones' thrust (actuation, allocation.max_thrust).")
-        out.print(
-            f"{n} cables within {part.max_cone_deg:g} deg of the vertical can be {widest:.1f} deg apart; "
-            f"{part.min_angle_deg:g} deg are asked for, which allows {allowed}."
-        )
+        _say(loaded, part, found)
         show_warnings(warnings)
         for conflict in conflicts:
             out.print(f"[red]conflict[/red]: {escape(conflict)}", highlight=False)
         out.print("not feasible" if conflicts else "feasible")
     if conflicts:
         raise typer.Exit(EXIT_ERROR)
+
+
+def _wind(mission: Mission) -> str:
+    """Which disturbances are not counted."""
+    disturbances = zip(mission.list_kinds["disturbance"], mission.disturbance, strict=True)
+    winds = [
+        f"disturbance.{i} ({kind})"
+        for i, (kind, each) in enumerate(disturbances)
+        if each.makes_wind
+    ]
+    return f"in calm air: the wind of {', '.join(winds)} is not counted" if winds else ""
+
+
+def _emit(
+    mission: Mission, found: Feasibility, conflicts: Sequence[str], warnings: Sequence[str]
+) -> None:
+    emit(
+        {
+            "mission": mission.name, "feasible": not conflicts, "conflicts": conflicts,
+            "weight_N": mission.team.load_mass * mission.team.gravity,
+            "lightest_N": found.lightest, "heaviest_N": found.heaviest,
+            "margin": found.margin, "binding": [asdict(each) for each in found.binding],
+            "widest_angle_deg": math.degrees(found.widest_angle),
+            "most_cables_found": found.most_cables[0], "most_cables_bound": found.most_cables[1],
+            "tensions_N": found.tensions.tolist(), "thrusts_N": found.thrusts.tolist(),
+            "thrust_limits_N": found.thrust_limits.tolist(), "wind": _wind(mission),
+            "warnings": warnings,
+        }
+    )  # fmt: skip
+
+
+def _say(mission: Mission, part: Safe, found: Feasibility) -> None:
+    from colift.control.allocation.limits.feasibility import SEARCHED
+
+    n = len(found.thrusts)
+    weight = mission.team.load_mass * mission.team.gravity
+    said = f"{escape(mission.name)}: {n} drones, load of {weight:.4g} N, hover {_wind(mission)}"
+    out.print(said.rstrip())
+    out.print(
+        f"Within the limits the cables hold {found.lightest:.4g} to {found.heaviest:.4g} N: "
+        f"{found.margin:.2f} times the load."
+    )
+    for each in found.binding:
+        out.print(f"  binding: {escape(str(each))}", highlight=False)
+    spare = found.thrust_limits / found.thrusts
+    i = int(spare.argmin())
+    if math.isfinite(spare[i]):
+        out.print(
+            f"In the allocator's formation drone {i} needs {found.thrusts[i]:.4g} N of thrust, the most "
+            f"for what it has: {found.thrust_limits[i]:.4g} N."
+        )
+    else:
+        out.print("Nothing limits the drones' thrust (actuation, allocation.max_thrust).")
+    most, bound = found.most_cables
+    allowed = f"{most} cables (found; never more than {bound})"
+    if most >= SEARCHED:
+        allowed = f"{most} cables or more"
+    out.print(
+        f"{n} cables within {part.max_cone_deg:g} deg of the vertical can be "
+        f"{math.degrees(found.widest_angle):.1f} deg apart; "
+        f"{part.min_angle_deg:g} deg are asked for, which allows {allowed}."
+    )

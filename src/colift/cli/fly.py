@@ -10,11 +10,13 @@ from rich.markup import escape
 
 from colift.cli.base import (
     Json,
+    MissionName,
     Sets,
     With,
     app,
     emit,
     err,
+    load_parts,
     loading,
     new_folder,
     out,
@@ -28,9 +30,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def fly(
-    mission: Annotated[
-        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
-    ] = "paper-spiral",
+    mission: MissionName = "paper-spiral",
     sets: Sets = None,
     speed: Annotated[
         float, typer.Option(help="Simulated over real time.", min=0.01, max=100.0)
@@ -60,11 +60,9 @@ def fly(
     with loading():
         from colift.mission import load_mission
         from colift.mission.warnings import warnings_of
-        from colift.part import load_file
         from colift.show.live.run import fly_live
 
-        for path in extra or []:
-            load_file(path)
+        load_parts(extra)
         loaded = load_mission(mission, parse_overrides(sets))
 
     show_warnings(warnings_of(loaded))

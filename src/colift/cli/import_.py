@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
 from colift.cli.base import Json, app, emit, out
+
+if TYPE_CHECKING:
+    from colift.record.recording import Recording
 
 # As in colift.record.importing.base, which help need not import.
 Frame = Literal["enu", "ned"]
@@ -16,40 +20,47 @@ Unit = Literal["m", "mm"]
 TimeUnit = Literal["s", "ms", "us", "ns"]
 QuaternionOrder = Literal["wxyz", "xyzw"]
 
+Files = Annotated[
+    list[Path],
+    typer.Argument(metavar="FILE...", help="One log of all drones, or one log of each drone."),
+]
+Target = Annotated[
+    Path | None,
+    typer.Option("--out", help="Recording to write.", show_default="FILE.h5, in this folder"),
+]
+CableLength = Annotated[
+    float | None,
+    typer.Option(help="Length of a cable, m.", show_default="median distance to the load"),
+]
+Axes = Annotated[
+    Frame | None,
+    typer.Option(help="Axes of a CSV: z up, or north-east-down.", show_default="enu"),
+]
+Lengths = Annotated[
+    Unit | None,
+    typer.Option(help="Unit of a CSV's positions and velocities.", show_default="m"),
+]
+Times = Annotated[TimeUnit | None, typer.Option(help="Unit of a CSV's times.", show_default="s")]
+Columns = Annotated[
+    QuaternionOrder | None, typer.Option(help="Order of a CSV's columns uavK_q0 to uavK_q3.")
+]
+Name = Annotated[
+    str | None, typer.Option(help="Name of the flight.", show_default="name of the first file")
+]
+
 
 @app.command(name="import")
 def import_(
-    files: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE...", help="One log of all drones, or one log of each drone."),
-    ],
-    target: Annotated[
-        Path | None,
-        typer.Option("--out", help="Recording to write.", show_default="FILE.h5, in this folder"),
-    ] = None,
+    files: Files,
+    target: Target = None,
     load_mass: Annotated[float, typer.Option(help="Mass of the load, kg.")] = 0.01,
     drone_mass: Annotated[float, typer.Option(help="Mass of a drone, kg.")] = 0.034,
-    cable_length: Annotated[
-        float | None,
-        typer.Option(help="Length of a cable, m.", show_default="median distance to the load"),
-    ] = None,
-    frame: Annotated[
-        Frame | None,
-        typer.Option(help="Axes of a CSV: z up, or north-east-down.", show_default="enu"),
-    ] = None,
-    unit: Annotated[
-        Unit | None,
-        typer.Option(help="Unit of a CSV's positions and velocities.", show_default="m"),
-    ] = None,
-    time_unit: Annotated[
-        TimeUnit | None, typer.Option(help="Unit of a CSV's times.", show_default="s")
-    ] = None,
-    quaternion: Annotated[
-        QuaternionOrder | None, typer.Option(help="Order of a CSV's columns uavK_q0 to uavK_q3.")
-    ] = None,
-    name: Annotated[
-        str | None, typer.Option(help="Name of the flight.", show_default="name of the first file")
-    ] = None,
+    cable_length: CableLength = None,
+    frame: Axes = None,
+    unit: Lengths = None,
+    time_unit: Times = None,
+    quaternion: Columns = None,
+    name: Name = None,
     as_json: Json = False,
 ) -> None:
     """Turn the logs of a real flight into a recording, for `report` and `judge`.
@@ -88,10 +99,14 @@ def import_(
                 "metrics": numbers,
                 "findings": recording.provenance["findings"],
                 "provenance": recording.provenance,
-                "file": str(path),
+                "file": path,
             }
         )
-        return
+    else:
+        _say(recording, numbers, path)
+
+
+def _say(recording: Recording, numbers: Mapping[str, float], path: Path) -> None:
     lengths = ", ".join(f"{length:.3f}" for length in recording.mission.team.cable_lengths)
     out.print(
         f"{escape(recording.mission.name)}: {recording.n} drones, {recording.time[-1]:.2f} s in "

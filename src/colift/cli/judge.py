@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -15,38 +16,47 @@ from colift.cli.base import (
     check_out,
     emit,
     err,
+    load_parts,
     loading,
     new_folder,
     out,
     progress,
+    result_folder,
     save_json,
+    several,
+    show_files,
     show_tables,
 )
+
+if TYPE_CHECKING:
+    from colift.record.recording import Recording
+    from colift.study.judge import Judged
+
+Flights = Annotated[
+    list[Path],
+    typer.Argument(metavar="FLIGHT...", help="Recordings, or logs that `import` reads."),
+]
+Allocators = Annotated[
+    str | None,
+    typer.Option(help="Names, separated by commas.", show_default="all that are installed"),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="ALLOCATOR.FIELD=VALUE",
+        help="Change a setting of an allocator, in the size of the paper's team.",
+    ),
+]
 
 
 @app.command()
 def judge(
-    flights: Annotated[
-        list[Path],
-        typer.Argument(metavar="FLIGHT...", help="Recordings, or logs that `import` reads."),
-    ],
-    allocators: Annotated[
-        str | None,
-        typer.Option(help="Names, separated by commas.", show_default="all that are installed"),
-    ] = None,
-    sets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="ALLOCATOR.FIELD=VALUE",
-            help="Change a setting of an allocator, in the size of the paper's team.",
-        ),
-    ] = None,
+    flights: Flights,
+    allocators: Allocators = None,
+    sets: Settings = None,
     extra: With = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Result folder.", show_default="runs/judge-DATE-TIME"),
-    ] = None,
+    folder: Annotated[Path | None, result_folder("judge")] = None,
     report: Annotated[bool, typer.Option(help="Write the HTML page and its figures.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -63,7 +73,6 @@ def judge(
     import shlex
 
     from colift.errors import RecordingError
-    from colift.mission.load import parse_override
 
     check_out(folder, ("judgement.json",))
     for path in flights:  # said before anything is compiled
@@ -71,33 +80,15 @@ def judge(
             raise RecordingError(f"{path}: there is no such file")
 
     with loading():
-        from colift.part import load_file
         from colift.study import judge as judgement
 
-        for path in extra or []:
-            load_file(path)
-        wanted = [name.strip() for name in allocators.split(",")] if allocators else None
-        kinds, skipped = judgement.choose(wanted)
-        settings: dict[str, dict[str, Any]] = {}
-        for text in sets or []:
-            key, value = parse_override(text)
-            kind, _, name = key.partition(".")
-            if not name or kind not in kinds:
-                raise typer.BadParameter(
-                    f"{text!r}: must be ALLOCATOR.FIELD=VALUE with one of {', '.join(kinds)}"
-                )
-            settings.setdefault(kind, {})[name] = value
+        load_parts(extra)
+        kinds, skipped = judgement.choose(several(allocators) or None)
+        settings = _settings(sets or [], kinds)
         recordings = [judgement.open_flight(path) for path in flights]
     for kind, why in skipped.items():
         err.print(f"left out: {kind} {why}", highlight=False, markup=False)
-    judged = []
-    with progress("Asking the allocators") as advance:
-        for k, recording in enumerate(recordings):
-
-            def tick(done: float, begin: int = k) -> None:
-                advance((begin + done) / len(recordings))
-
-            judged.append(judgement.judge(recording, kinds, settings, progress=tick))
+    judged = _ask(recordings, kinds, settings)
     findings = judgement.findings(judged)
     result = {
         "flights": [flight.as_dict() for flight in judged],
@@ -115,11 +106,45 @@ def judge(
         command += [word for text in sets or [] for word in ("--set", text)]
         files["page"] = write_page(judged, skipped, target, shlex.join(command))
     if as_json:
-        emit({**result, "files": {name: str(path) for name, path in files.items()}})
+        emit({**result, "files": files})
         return
     show_tables(judgement.tables(judged))
     out.print(judgement.NOTE, style="dim", highlight=False)
     for sentence in findings:
         out.print(escape(sentence), highlight=False)
-    for name, path in files.items():
-        out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+    show_files(files)
+
+
+def _settings(sets: Sequence[str], kinds: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Settings by allocator, from ``ALLOCATOR.FIELD=VALUE``."""
+    from colift.mission.load import parse_override
+
+    settings: dict[str, dict[str, Any]] = {}
+    for text in sets:
+        key, value = parse_override(text)
+        kind, _, name = key.partition(".")
+        if not name or kind not in kinds:
+            raise typer.BadParameter(
+                f"{text!r}: must be ALLOCATOR.FIELD=VALUE with one of {', '.join(kinds)}"
+            )
+        settings.setdefault(kind, {})[name] = value
+    return settings
+
+
+def _ask(
+    recordings: Sequence[Recording],
+    kinds: Sequence[str],
+    settings: dict[str, dict[str, Any]],
+) -> list[Judged]:
+    """The judgement of each flight, with a bar of progress over all."""
+    from colift.study.judge import judge
+
+    judged = []
+    with progress("Asking the allocators") as advance:
+        for k, recording in enumerate(recordings):
+
+            def tick(done: float, begin: int = k) -> None:
+                advance((begin + done) / len(recordings))
+
+            judged.append(judge(recording, kinds, settings, progress=tick))
+    return judged

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from colift.cli.base import Json, app, emit, loading, progress, save_json, show_tables
+from colift.cli.base import Json, JsonFile, app, emit, loading, progress, save_json, show_tables
 
 
 @app.command()
@@ -23,7 +22,7 @@ def latency(
     realtime: Annotated[
         bool, typer.Option(help="Under the real-time scheduler (Linux, with the right to).")
     ] = False,
-    file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
+    file: JsonFile = None,
     as_json: Json = False,
 ) -> None:
     """Call the allocators on a clock while other processes use the machine.

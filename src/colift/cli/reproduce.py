@@ -9,15 +9,23 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from colift.cli.base import Json, app, check_out, emit, loading, new_folder, out, progress
+from colift.cli.base import (
+    Json,
+    app,
+    check_out,
+    emit,
+    loading,
+    new_folder,
+    out,
+    progress,
+    result_folder,
+    show_files,
+)
 
 
 @app.command()
 def reproduce(
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Result folder.", show_default="runs/reproduce-DATE-TIME"),
-    ] = None,
+    folder: Annotated[Path | None, result_folder("reproduce")] = None,
     report: Annotated[bool, typer.Option(help="Write the HTML page and its figures.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -38,7 +46,7 @@ def reproduce(
 
         files["report"] = write_page(result, target)
     if as_json:
-        emit({**result.as_dict(), "files": {name: str(path) for name, path in files.items()}})
+        emit({**result.as_dict(), "files": files})
         return
     for section, rows in result.sections():
         table = Table(title=section, title_justify="left", show_lines=True)
@@ -51,5 +59,4 @@ def reproduce(
                 escape(row.quantity), row.paper_text, row.ours_text, escape(row.verdict_text)
             )
         out.print(table)
-    for name, path in files.items():
-        out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+    show_files(files)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -13,33 +14,35 @@ from rich.table import Table
 from colift.cli.base import (
     RUN_FILES,
     Json,
+    MissionName,
     Sets,
     With,
     app,
     check_out,
     emit,
     end_with,
+    load_parts,
     loading,
     new_folder,
     out,
     progress,
+    result_folder,
+    show_files,
     show_verdict,
     show_warnings,
     write_results,
 )
 
+if TYPE_CHECKING:
+    from colift.flight.runner import Run
+
 
 @app.command()
 def run(
-    mission: Annotated[
-        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
-    ] = "paper-spiral",
+    mission: MissionName = "paper-spiral",
     sets: Sets = None,
     seed: Annotated[int | None, typer.Option(help="Seed instead of the mission's.")] = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Result folder.", show_default="runs/MISSION-DATE-TIME"),
-    ] = None,
+    folder: Annotated[Path | None, result_folder("MISSION")] = None,
     extra: With = None,
     report: Annotated[bool, typer.Option(help="Write the HTML report and its figures.")] = True,
     as_json: Json = False,
@@ -60,12 +63,9 @@ def run(
     check_out(folder, RUN_FILES)
     with loading():
         import colift
-        from colift.mission.criteria import METRICS
         from colift.mission.warnings import warnings_of
-        from colift.part import load_file
 
-        for path in extra or []:
-            load_file(path)
+        load_parts(extra)
         overrides = parse_overrides(sets)
         loaded = colift.load_mission(
             mission, {**overrides, **({} if seed is None else {"seed": seed})}
@@ -74,7 +74,6 @@ def run(
     show_warnings(warnings)
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
-    verdict = flown.verdict
     files: dict[str, Path] = {}
     unwritten = None
     try:
@@ -82,40 +81,52 @@ def run(
     except OSError as error:  # what was flown is told all the same
         unwritten = error
     if as_json:
-        emit(
-            {
-                "mission": loaded.name,
-                "verdict": {"level": verdict.level, "reasons": verdict.reasons},
-                "warnings": [str(each) for each in warnings],
-                "outcome": flown.recording.outcome,
-                "summary": verdict.sentence,
-                "metrics": flown.metrics,
-                "criteria": [asdict(each) for each in verdict.judged],
-                "loop_time_s": flown.loop_time,
-                "compiled": flown.compiled,
-                "files": {name: str(path) for name, path in files.items()},
-                **({"error": str(unwritten)} if unwritten else {}),
-            }
-        )
+        _emit(flown, warnings, files, unwritten)
     else:
-        table = Table(title=escape(loaded.name), title_justify="left")
-        table.add_column("metric")
-        table.add_column("value", justify="right")
-        table.add_column("unit")
-        table.add_column("meaning", style="dim")
-        for metric in METRICS:
-            value = f"{flown.metrics[metric.name]:.5g}"
-            table.add_row(metric.name, value, metric.unit, metric.meaning)
-        out.print(table)
-        show_verdict(verdict)
-        simulated = loaded.timing.duration
-        how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
-        out.print(
-            f"{simulated:g} s of flight in {flown.loop_time:.3f} s ({how}, "
-            f"{simulated / flown.loop_time:.0f} times real time)."
-        )
-        for name, path in files.items():
-            out.print(f"{name:>10}  {escape(str(path))}", highlight=False, soft_wrap=True)
+        _say(flown, files)
     if unwritten:
         raise unwritten
-    end_with(verdict)
+    end_with(flown.verdict)
+
+
+def _emit(
+    flown: Run, warnings: Iterable[object], files: dict[str, Path], unwritten: OSError | None
+) -> None:
+    verdict = flown.verdict
+    emit(
+        {
+            "mission": flown.mission.name,
+            "verdict": {"level": verdict.level, "reasons": verdict.reasons},
+            "warnings": [str(each) for each in warnings],
+            "outcome": flown.recording.outcome,
+            "summary": verdict.sentence,
+            "metrics": flown.metrics,
+            "criteria": [asdict(each) for each in verdict.judged],
+            "loop_time_s": flown.loop_time,
+            "compiled": flown.compiled,
+            "files": files,
+            **({"error": str(unwritten)} if unwritten else {}),
+        }
+    )
+
+
+def _say(flown: Run, files: dict[str, Path]) -> None:
+    from colift.mission.criteria import METRICS
+
+    table = Table(title=escape(flown.mission.name), title_justify="left")
+    table.add_column("metric")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    table.add_column("meaning", style="dim")
+    for metric in METRICS:
+        value = f"{flown.metrics[metric.name]:.5g}"
+        table.add_row(metric.name, value, metric.unit, metric.meaning)
+    out.print(table)
+    show_verdict(flown.verdict)
+    simulated = flown.mission.timing.duration
+    how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
+    out.print(
+        f"{simulated:g} s of flight in {flown.loop_time:.3f} s ({how}, "
+        f"{simulated / flown.loop_time:.0f} times real time)."
+    )
+    show_files(files)

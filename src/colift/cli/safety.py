@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from colift.cli.base import Json, app, emit, loading, numbers, progress, save_json, show_tables
+from colift.cli.base import (
+    Json,
+    JsonFile,
+    app,
+    emit,
+    loading,
+    numbers,
+    progress,
+    save_json,
+    show_tables,
+)
 
 
 @app.command()
@@ -19,7 +28,7 @@ def safety(
         int, typer.Option(min=100, max=10_000_000, help="Cycles per team and family of forces.")
     ] = 20_000,
     quick: Annotated[bool, typer.Option(help="A tenth of it; for a first look.")] = False,
-    file: Annotated[Path | None, typer.Option("--out", help="Write the JSON here as well.")] = None,
+    file: JsonFile = None,
     as_json: Json = False,
 ) -> None:
     """Attack the safe allocator and fly it, beside the paper's allocator.

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 
 from colift.cli.base import (
     Json,
+    MissionName,
     Sets,
     With,
     app,
@@ -18,7 +19,9 @@ from colift.cli.base import (
     loading,
     new_folder,
     out,
+    result_folder,
     save_json,
+    several,
     show_tables,
 )
 from colift.cli.campaign import (
@@ -35,41 +38,47 @@ from colift.cli.campaign import (
     export,
     fly,
     show_end,
+    told,
 )
+
+if TYPE_CHECKING:
+    from colift.study.campaign.plan import Plan
+
+Conditions = Annotated[
+    str | None,
+    typer.Option(
+        metavar="A;B;...", help="Conditions, separated by semicolons.", show_default="all"
+    ),
+]
+Allocators = Annotated[
+    str | None,
+    typer.Option(metavar="A,B,...", help="Allocators.", show_default="the mission's"),
+]
+Plants = Annotated[
+    str | None, typer.Option(metavar="A,B,...", help="Plants.", show_default="the mission's")
+]
+Seeds = Annotated[
+    int, typer.Option(min=1, max=10_000, help="Flights of each case; seed k breaks drone k.")
+]
+Replays = Annotated[
+    int, typer.Option(min=0, max=1000, help="Most failing flights that get a replay.")
+]
+Names = Annotated[bool, typer.Option("--list", help="Name the conditions and end.")]
 
 
 @app.command()
 def stress(
-    mission: Annotated[
-        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
-    ] = "real-world",
-    conditions: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A;B;...", help="Conditions, separated by semicolons.", show_default="all"
-        ),
-    ] = None,
-    allocators: Annotated[
-        str | None,
-        typer.Option(metavar="A,B,...", help="Allocators.", show_default="the mission's"),
-    ] = None,
-    plants: Annotated[
-        str | None, typer.Option(metavar="A,B,...", help="Plants.", show_default="the mission's")
-    ] = None,
-    seeds: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Flights of each case; seed k breaks drone k.")
-    ] = 4,
+    mission: MissionName = "real-world",
+    conditions: Conditions = None,
+    allocators: Allocators = None,
+    plants: Plants = None,
+    seeds: Seeds = 4,
     first_seed: FirstSeed = 0,
     sets: Sets = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Result folder.", show_default="runs/stress-DATE-TIME"),
-    ] = None,
-    replays: Annotated[
-        int, typer.Option(min=0, max=1000, help="Most failing flights that get a replay.")
-    ] = 12,
+    folder: Annotated[Path | None, result_folder("stress")] = None,
+    replays: Replays = 12,
     strict: Strict = False,
-    names: Annotated[bool, typer.Option("--list", help="Name the conditions and end.")] = False,
+    names: Names = False,
     extra: With = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -108,33 +117,48 @@ def stress(
         changes = parse_overrides(sets)
         chosen = study.expand(conditions) if conditions else study.condition_names()
         flown_seeds = range(first_seed, first_seed + seeds)
-        planned = plan(
-            study.cases(
-                mission, chosen, _several(allocators), _several(plants), flown_seeds, changes
-            ),
-            sources,
-        )  # fmt: skip
+        cases = study.cases(
+            mission, chosen, several(allocators), several(plants), flown_seeds, changes
+        )
+        planned = plan(cases, sources)
     target = folder or new_folder("stress")
     outcome = fly(
         "Stressing", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed,
     )  # fmt: skip
-    from colift.kernel.math.shares import interval, text
-    from colift.show.report.stress import matrix_tables, write_stress
+    rows = outcome.rows
+    result = {
+        "mission": mission, "command": command_line(), "seeds": [flown_seeds[0], flown_seeds[-1]],
+        **_judge(rows), **told(outcome), "files": _write(planned, rows, target, replays),
+    }  # fmt: skip
+    save_json(target / "stress.json", result)
+    export(rows, csv, parquet)
+    if as_json:
+        emit(result)
+    else:
+        _say(mission, rows, result)
+        show_end(outcome, result["files"])
+    end(rows, strict)
+
+
+def _write(
+    planned: Plan, rows: Sequence[dict[str, Any]], target: Path, replays: int
+) -> dict[str, Path]:
+    from colift.show.report.stress import write_stress
+
+    missions = {job.key: job.mission for _, job in planned}
+    page = write_stress(rows, missions, target, command=command_line(), replays=replays)
+    return {"report": page, "results": target / FILE}
+
+
+def _judge(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """What passes and what fails, for JSON."""
+    from colift.kernel.math.shares import interval
+    from colift.study import stress as study
     from colift.study.campaign.judge import held
 
-    rows = outcome.rows
-    missions = {job.key: job.mission for _, job in planned}
-    files = {
-        "report": write_stress(rows, missions, target, command=command_line(), replays=replays),
-        "results": target / FILE,
-    }
-    passed = sum(map(held, rows))
-    result = {
-        "mission": mission,
-        "command": command_line(),
-        "seeds": [first_seed, first_seed + seeds - 1],
-        "passed": passed,
+    return {
+        "passed": sum(map(held, rows)),
         "flights": len(rows),
         "conditions": {
             condition: [
@@ -148,31 +172,22 @@ def stress(
             for condition, cells in study.matrix(rows).items()
         },
         "failing": [
-            {**_labels(row), "level": row["level"], "reason": study.reason(row)}
+            {
+                **{name: row[name] for name in ("condition", "allocator", "plant", "seed")},
+                "level": row["level"],
+                "reason": study.reason(row),
+            }
             for row in rows
             if not held(row)
         ],
-        "flown": outcome.flown,
-        "wall_time_s": outcome.wall_time,
-        "workers": outcome.workers,
-        "files": {name: str(path) for name, path in files.items()},
     }  # fmt: skip
-    save_json(target / "stress.json", result)
-    export(rows, csv, parquet)
-    if as_json:
-        emit(result)
-    else:
-        show_tables(
-            (f"{mission}, {title}", header, lines) for title, header, lines in matrix_tables(rows)
-        )
-        out.print(f"{text(passed, len(rows))} flights pass.", highlight=False)
-        show_end(outcome, files)
-    end(rows, strict)
 
 
-def _several(text: str | None) -> list[str]:
-    return text.split(",") if text else []
+def _say(mission: str, rows: Sequence[dict[str, Any]], result: dict[str, Any]) -> None:
+    from colift.kernel.math.shares import text
+    from colift.show.report.stress import matrix_tables
 
-
-def _labels(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: row[name] for name in ("condition", "allocator", "plant", "seed")}
+    show_tables(
+        (f"{mission}, {title}", header, lines) for title, header, lines in matrix_tables(rows)
+    )
+    out.print(f"{text(result['passed'], result['flights'])} flights pass.", highlight=False)

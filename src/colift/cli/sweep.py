@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 
 from colift.cli.base import (
     Json,
+    MissionName,
     Sets,
     With,
     app,
@@ -17,6 +18,7 @@ from colift.cli.base import (
     loading,
     new_folder,
     out,
+    result_folder,
     show_tables,
 )
 from colift.cli.campaign import (
@@ -37,29 +39,30 @@ from colift.cli.campaign import (
     in_order,
     say_refused,
     show_end,
+    told,
 )
+
+if TYPE_CHECKING:
+    from colift.show.report.campaign_figures import Swept
+
+Over = Annotated[
+    list[str],
+    typer.Option(
+        "--over",
+        metavar="KEY=LOW:HIGH:COUNT[:log]",
+        help="Field to sweep, or KEY=VALUE,VALUE,...; several of them make a grid.",
+    ),
+]
 
 
 @app.command()
 def sweep(
-    mission: Annotated[
-        str, typer.Argument(help="Name of a shipped mission (see `colift list`) or a TOML file.")
-    ],
-    over: Annotated[
-        list[str],
-        typer.Option(
-            "--over",
-            metavar="KEY=LOW:HIGH:COUNT[:log]",
-            help="Field to sweep, or KEY=VALUE,VALUE,...; several of them make a grid.",
-        ),
-    ],
+    mission: MissionName,
+    over: Over,
     seeds: Seeds = 1,
     first_seed: FirstSeed = 0,
     sets: Sets = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Result folder.", show_default="runs/sweep-DATE-TIME"),
-    ] = None,
+    folder: Annotated[Path | None, result_folder("sweep")] = None,
     extra: With = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -97,48 +100,49 @@ def sweep(
         f"Sweeping {mission}", planned, target, workers=workers, scheduler=scheduler,
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
-    from colift.kernel.math.shares import interval
-    from colift.show.report.campaign import not_held, sweep_tables, write_sweep
+    from colift.show.report.campaign import write_sweep
     from colift.show.report.campaign_figures import Swept
 
     rows = in_order(cases, outcome.rows, refused)
     swept = Swept(rows, overs)
     title = f"{mission} over {', '.join(o.path for o in overs)}"
-    files = {
-        "report": write_sweep(title, swept, target, command=command_line()),
-        "results": target / FILE,
-    }
+    page = write_sweep(title, swept, target, command=command_line())
+    files = {"report": page, "results": target / FILE}
     export(rows, csv, parquet)
     if as_json:
-        emit(
-            {
-                "mission": mission,
-                "over": {o.path: list(o.values) for o in overs},
-                "seeds": seeds,
-                "first_seed": first_seed,
-                "points": [
-                    {
-                        "values": dict(zip((o.path for o in overs), point.values, strict=True)),
-                        "flights": point.flights,
-                        "fates": dict(point.fates),
-                        "held": point.held,
-                        "interval": interval(point.held, point.flights),
-                        "reasons": point.reasons,
-                        "metrics": {
-                            name: dict(zip(("mean", "min", "max"), numbers, strict=True))
-                            for name, numbers in point.spread.items()
-                        },
-                    }
-                    for point in swept.points
-                ],
-                "flown": outcome.flown,
-                "wall_time_s": outcome.wall_time,
-                "files": {name: str(path) for name, path in files.items()},
-            }
-        )
+        begin = {"mission": mission, "seeds": seeds, "first_seed": first_seed}
+        emit({**begin, **_judge(swept), **told(outcome), "files": files})
     else:
-        show_tables(sweep_tables(swept))
-        for sentence in not_held(swept):
-            out.print(f"- {escape(sentence)}", highlight=False, soft_wrap=True)
+        _say(swept)
         show_end(outcome, files)
     end(rows, strict)
+
+
+def _judge(swept: Swept) -> dict[str, Any]:
+    """The numbers at each combination of values, for JSON."""
+    from colift.kernel.math.shares import interval
+
+    overs = swept.overs
+    return {
+        "over": {o.path: list(o.values) for o in overs},
+        "points": [
+            {
+                "values": dict(zip((o.path for o in overs), point.values, strict=True)),
+                "flights": point.flights, "fates": dict(point.fates), "held": point.held,
+                "interval": interval(point.held, point.flights), "reasons": point.reasons,
+                "metrics": {
+                    name: dict(zip(("mean", "min", "max"), numbers, strict=True))
+                    for name, numbers in point.spread.items()
+                },
+            }
+            for point in swept.points
+        ],
+    }  # fmt: skip
+
+
+def _say(swept: Swept) -> None:
+    from colift.show.report.campaign import not_held, sweep_tables
+
+    show_tables(sweep_tables(swept))
+    for sentence in not_held(swept):
+        out.print(f"- {escape(sentence)}", highlight=False, soft_wrap=True)

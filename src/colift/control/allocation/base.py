@@ -428,11 +428,7 @@ class Allocator:
         except (TypeError, ValueError):
             wanted = motion = np.empty(0)
         if wanted.shape != (3,) or motion.shape != (3,):
-            numbers("force", force, (3,), finite=False)
-            numbers(
-                "acceleration", _REST if acceleration is None else acceleration, (3,), finite=False
-            )
-            numbers("dt", self.dt if dt is None else dt, (), finite=False)
+            _refuse(force=force, acceleration=acceleration, dt=dt)
         self._force[:] = wanted
         self._reference[2] = motion
         start = perf_counter()
@@ -456,6 +452,15 @@ class Allocator:
             self._info.copy(),
             elapsed,
         )
+
+
+def _refuse(force: ArrayLike, acceleration: ArrayLike | None, dt: float | None) -> None:
+    """Say what of it is not the numbers that :meth:`Allocator.allocate` takes."""
+    numbers("force", force, (3,), finite=False)
+    if acceleration is not None:
+        numbers("acceleration", acceleration, (3,), finite=False)
+    if dt is not None:
+        numbers("dt", dt, (), finite=False)
 
 
 def _units(

@@ -15,9 +15,9 @@ from colift.errors import FlightDataError
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.mission.schema import Drones, Load, RealFlight, Section, Start, Timing
 from colift.record.ends import ends_of
-from colift.record.importing._clocks import merge
+from colift.record.importing._clocks import Offset, merge
 from colift.record.importing._plausible import LONGEST, clean, doubt
-from colift.record.importing.base import Array, Log, Reading, read
+from colift.record.importing.base import Array, Finding, Log, Reading, read
 from colift.record.recording import Recording, versions
 from colift.wording import Refusing
 
@@ -89,20 +89,8 @@ def import_flight(
     if len(log.time) < 2:
         raise FlightDataError(f"{paths[0]}: the logs have no stretch of time in common")
     arrays, spread = _signals(log)
-    findings = sorted(log.findings, key=lambda finding: (finding.kind, finding.begin))
-    provenance: dict[str, Any] = {
-        "files": [
-            {
-                "name": path.name,
-                "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-                "format": kind,
-                "clock_offset_s": shift.seconds,
-                "load_mismatch_rms_m": shift.residual,
-            }
-            for path, kind, shift in zip(paths, kinds, offsets, strict=True)
-        ],
-        "findings": [{**asdict(each), "text": str(each)} for each in findings],
-        "importer": f"colift {versions()['colift']}",
+    provenance = {
+        **_provenance(paths, kinds, offsets, log.findings),
         "assumed": assumed.model_dump(exclude_none=True),
         "force": "mean of the drones' own copies",
         "force_copies_spread_rms_N": spread,
@@ -114,6 +102,27 @@ def import_flight(
         arrays=arrays,
         provenance=provenance,
     )
+
+
+def _provenance(
+    paths: Sequence[Path], kinds: Sequence[str], shifts: Sequence[Offset], found: Sequence[Finding]
+) -> dict[str, Any]:
+    """Where a recording comes from, and what was found on the way."""
+    findings = sorted(found, key=lambda finding: (finding.kind, finding.begin))
+    return {
+        "files": [
+            {
+                "name": path.name,
+                "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+                "format": kind,
+                "clock_offset_s": shift.seconds,
+                "load_mismatch_rms_m": shift.residual,
+            }
+            for path, kind, shift in zip(paths, kinds, shifts, strict=True)
+        ],
+        "findings": [{**asdict(each), "text": str(each)} for each in findings],
+        "importer": f"colift {versions()['colift']}",
+    }
 
 
 def _checked(path: Path, log: Log) -> Log:
