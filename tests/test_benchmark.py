@@ -17,6 +17,7 @@ from colift.study import bench as benchmark
 from colift.study.bench import instructions, problems, solvers, tables, timing
 from colift.study.bench.problems import Problem
 from colift.study.bench.referee import TOLERANCES, judge
+from colift.team.scaling import scaled_load, scaled_mu
 
 SIZES = (2, 3, 4, 16)
 
@@ -25,7 +26,7 @@ SIZES = (2, 3, 4, 16)
 def test_the_problem_keeps_the_papers_cone(n) -> None:
     from colift.control.allocation.paper.newton import optimal_alignment
 
-    mass, mu = problems.scaled_problem(n)
+    mass, mu = scaled_load(n), scaled_mu(n)
     share = optimal_alignment(n, mu / (mass * 9.81) ** 2) / n
     assert share == pytest.approx(0.689, abs=0.001)
 
@@ -33,7 +34,7 @@ def test_the_problem_keeps_the_papers_cone(n) -> None:
 def test_noise_is_the_same_in_every_run_and_has_the_size_that_is_said() -> None:
     smooth, noisy = (problems.forces(4, 20_000, family=family) for family in problems.FAMILIES)
     assert np.array_equal(noisy, problems.forces(4, 20_000, family="noisy"))
-    deviation = np.std(noisy - smooth, axis=0) / problems.scaled_problem(4)[0]
+    deviation = np.std(noisy - smooth, axis=0) / scaled_load(4)
     assert deviation == pytest.approx([problems.NOISE] * 3, rel=0.03)
 
 

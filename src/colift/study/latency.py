@@ -49,9 +49,10 @@ from colift.kernel.jit import (
     void,
 )
 from colift.study.bench.machine import machine
-from colift.study.bench.problems import forces, scaled_problem
+from colift.study.bench.problems import forces
 from colift.team import Team
 from colift.team.geometry import Array, ring
+from colift.team.scaling import scaled_load, scaled_mu
 
 if TYPE_CHECKING:
     from colift.flight.flight import Progress
@@ -299,8 +300,7 @@ def run(
 
     """
     count = (os.cpu_count() or 1) if others is None else others
-    mass, mu = scaled_problem(n)
-    team = Team.uniform(n, load_mass=mass)
+    mu, team = scaled_mu(n), Team.uniform(n, load_mass=scaled_load(n))
     least = 30.0 if n <= 8 else 11.0
     cases = [
         (caller, name, part)

@@ -19,6 +19,7 @@ from colift.kernel.jit import address_of, f8, i8, kernel, matrix, monotonic_ns, 
 from colift.kernel.math import shares
 from colift.team import Team
 from colift.team.geometry import Array, pairwise_angles
+from colift.team.scaling import PAPER_DRONES, scaled_load, scaled_mu
 
 if TYPE_CHECKING:
     from colift.flight.flight import Progress
@@ -152,11 +153,10 @@ class Attack:
 
 
 def problem(n: int) -> tuple[Team, Safe]:
-    """Team and limits of the attacks: load and ``mu`` keep the paper's cone whatever n is."""
-    team = Team.uniform(n, load_mass=0.225 * max(1.0, n / 4))
-    return team, Safe(
-        mu=0.15 * min(1.0, 4 / n) if n > 4 else 0.15, min_angle_deg=LEAST_ANGLES.get(n, 30.0)
-    )
+    """Team and limits of the attacks: load and ``mu`` keep the paper's cone from four drones on; fewer carry its load."""
+    size = max(n, PAPER_DRONES)
+    team = Team.uniform(n, load_mass=scaled_load(size))
+    return team, Safe(mu=scaled_mu(size), min_angle_deg=LEAST_ANGLES.get(n, 30.0))
 
 
 class Answers(NamedTuple):

@@ -15,6 +15,7 @@ from colift.mission.load import load_mission
 from colift.mission.mission import Mission
 from colift.record import metrics
 from colift.record.recording import Recording
+from colift.team.scaling import scaled_load, scaled_mu
 
 FAULTS: dict[str, dict[str, Any]] = {
     "cable cut": {"kind": "cable-cut"},
@@ -95,13 +96,14 @@ def team_table(source: str | Mapping[str, Any], n: int) -> dict[str, Any]:
     allocator's limits.
     """
     table = load_mission(source).resolved()
-    growth = n / table["drones"]["count"]
+    count = table["drones"]["count"]
+    growth = n / count
     table["drones"]["count"] = n
-    table["load"]["mass"] *= growth
+    table["load"]["mass"] = scaled_load(n, table["load"]["mass"], count)
     for gain in ("k_p", "k_d", "k_i"):
         table["load_control"][gain] = [growth * value for value in table["load_control"][gain]]
     limits = table["allocation"]
-    limits["mu"] *= growth**2
+    limits["mu"] = scaled_mu(n, limits["mu"], count, keep="mu over squared weight")
     cone = np.radians(max(table["start"]["cone_deg"], 0.7 * limits["max_cone_deg"]))
     apart = np.radians(limits["min_angle_deg"] + 2.0)
     table["start"]["directions"] = spread_formation(n, cone, apart).tolist()

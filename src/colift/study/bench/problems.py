@@ -20,6 +20,7 @@ from colift.control.allocation.safe import Safe
 from colift.control.allocation.sqp import Sqp
 from colift.team import Team
 from colift.team.geometry import Array
+from colift.team.scaling import scaled_load, scaled_mu
 
 Name = Literal["paper", "safe"]
 Family = Literal["smooth", "noisy"]
@@ -35,11 +36,6 @@ WIDEST_CONE, TENSION_MIN, TENSION_MAX = 75.0, 0.05, 5.0
 """Limits of the safe problem, degrees and N; the defaults of the allocator ``safe``."""
 SETTLED = 200
 """Cycles after which a formation counts as settled at the first force."""
-
-
-def scaled_problem(n: int) -> tuple[float, float]:
-    """Load mass (kg) and ``mu`` (N^2) that keep the paper's optimal cone for n drones."""
-    return 0.225 * n / 4, 0.15 * 4 / n
 
 
 def least_angle_deg(n: int) -> float:
@@ -59,7 +55,7 @@ def forces(n: int, count: int, *, family: Family = "smooth", period: float = 1e-
     )
     if family == "noisy":
         wanted += NOISE * np.random.default_rng(n).standard_normal((count, 3))
-    return scaled_problem(n)[0] * wanted
+    return scaled_load(n) * wanted
 
 
 @dataclass(frozen=True)
@@ -72,7 +68,7 @@ class Problem:
     @property
     def mu(self) -> float:
         """Weight of the alignment penalty, N^2."""
-        return scaled_problem(self.n)[1]
+        return scaled_mu(self.n)
 
     @property
     def period(self) -> float:
@@ -91,7 +87,7 @@ class Problem:
     @cached_property
     def team(self) -> Team:
         """The drones and their load."""
-        return Team.uniform(self.n, load_mass=scaled_problem(self.n)[0])
+        return Team.uniform(self.n, load_mass=scaled_load(self.n))
 
     @cached_property
     def own(self) -> Sqp | Safe:

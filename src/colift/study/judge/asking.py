@@ -35,6 +35,7 @@ from colift.record.metrics import mean
 from colift.record.recording import Recording
 from colift.team import Team
 from colift.team.geometry import pairwise_angles
+from colift.team.scaling import scaled_load, scaled_mu
 
 Array = NDArray[np.float64]
 
@@ -200,7 +201,7 @@ def parts_for(
         part = find("allocation", kind)
         fields = dict((settings or {}).get(kind, {}))
         if "mu" in part.model_fields:
-            fields.setdefault("mu", part.model_fields["mu"].default * PAPER.n / n)
+            fields.setdefault("mu", scaled_mu(n, part.model_fields["mu"].default))
         try:
             made = part.model_validate(fields)
         except ValidationError as error:
@@ -279,7 +280,7 @@ def twin(team: Team, mean_force: float) -> tuple[Team, float]:
 
     By the mean force and not by the load's mass, which a log does not tell; in hover they agree.
     """
-    load_mass = PAPER.load_mass / PAPER.n * team.n
+    load_mass = scaled_load(team.n)
     scale = load_mass * PAPER.gravity / mean_force
     longer = float(PAPER.cable_lengths.mean() / team.cable_lengths.mean())
     return replace(
