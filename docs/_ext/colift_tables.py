@@ -15,7 +15,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from colift.catalogue import DEFAULT_KINDS
 from colift.kernel.ports import PORTS
-from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, Signal
+from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, OF_ONE, SIGNALS, Signal
 from colift.mission import Mission, schema
 from colift.mission.criteria import METRICS
 from colift.part import FOLDERS, find, names
@@ -128,9 +128,17 @@ class PortTable(SphinxDirective):
 
 
 class SignalTable(SphinxDirective):
-    """Symbol table of everything that flows between the layers."""
+    """Symbol table of everything that flows between the layers; with ``agents``, of what one drone's agent sees and writes."""
+
+    optional_arguments = 1
 
     def run(self) -> list[nodes.Node]:
+        if self.arguments == ["agents"]:
+            mine = [
+                ["writes" if s.writer else "sees", code(s.name), code(shape_text(s)), s.meaning]
+                for s in OF_ONE
+            ]
+            return [table(["", "name", "shape", "meaning"], mine)]
         rows = [
             [math(latex(s.symbol)), code(s.name), code(shape_text(s)), s.unit, s.frame, s.meaning]
             for s in (*SIGNALS, *CYCLE_SIGNALS)

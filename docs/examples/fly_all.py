@@ -9,7 +9,7 @@ from colift.control.allocation.base import Allocator
 from colift.part import load_file
 
 here = Path(__file__).parent
-for name in ("my_allocator", "my_plain_allocator", "my_reference", "my_plant"):
+for name in ("my_allocator", "my_plain_allocator", "my_reference", "my_plant", "my_agent"):
     (part,) = load_file(here / f"{name}.py")
     if part.layer != "allocation":
         continue
@@ -37,3 +37,11 @@ assert run.compiled
 assert run.recording.outcome == "completed"
 assert run.metrics["tracking_rms_m"] < 0.05
 assert run.metrics["slack_time_s"] == 0.0
+
+run = colift.run("hover", overrides={"drones.count": 3, "agents.kind": "my-agent"})
+print(
+    f"{'my-agent':20} {run.recording.outcome:12} RMS {run.metrics['tracking_rms_m'] * 100:.2f} cm"
+)
+assert run.compiled
+assert run.recording.outcome == "completed"
+assert run.metrics["tracking_rms_m"] < 0.02

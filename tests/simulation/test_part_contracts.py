@@ -18,7 +18,7 @@ from colift.flight.flight import Flight
 from colift.flight.loop import FUNCTIONS
 from colift.kernel import jit
 from colift.kernel.ports import PORTS
-from colift.kernel.signals import CONDITIONS, SIGNALS
+from colift.kernel.signals import CONDITIONS, HIDDEN, SIGNALS
 from colift.mission import load_mission
 from colift.team import Team
 from colift.wording import meanings
@@ -55,7 +55,7 @@ def test_every_folder_has_a_part():
 
 
 def test_every_signal_has_one_writer_or_is_a_condition():
-    assert {signal.writer for signal in SIGNALS} == {*PORTS, ""}
+    assert {signal.writer for signal in (*HIDDEN, *SIGNALS)} == {*PORTS, ""}
     assert tuple(signal.name for signal in SIGNALS if not signal.writer) == CONDITIONS
 
 

@@ -273,6 +273,7 @@ class Flight:
                 now[team.n :] = before[len(old.drones) :]
             else:
                 now[:] = before
+        bus.outboxes[~new] = old.bus.outboxes[stay]
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
         self.wires.reference.writes.reference[:] = old.circuit.wires.reference.writes.reference
 
@@ -445,6 +446,7 @@ class Flight:
         params = {layer: self._parts[layer].of(drones).params(team) for layer in LAYERS[:-1]}
         params["plant"] = self.mission.plant.params(self._true_team(drones))
         bus = make_bus(team.n)
+        bus.members[:] = drones
         parts = {layer: type(part) for layer, part in self._parts.items()}
         wired = circuit(bus, parts, self._keys, params, memory, disturbances)
         self._legs.append(Leg(drones, team, bus, wired, self._step))

@@ -4,6 +4,7 @@
         ^                                                                                   |
     estimation <- sensing <- plant <- disturbances, actuation  <----------------------------+
 
+In a team without a leader network and agents (:mod:`colift.flight.agents`) stand where allocation and link do.
 The loop is compiled when every part is, and runs as plain Python otherwise: same code, `advance` or
 `advance.py_func`.
 """
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from colift.catalogue import LAYERS
 from colift.control.allocation.base import INFO_SIZE, Status
 from colift.errors import ColiftError
+from colift.flight import agents
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
 from colift.kernel.load import ends_of
 from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named, type_of
@@ -46,6 +48,7 @@ Common = named_tuple(
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
         "peak_tensions", "catch_impulses", "carrying", "clock", "reference",
         "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends",
+        *(name for name in agents.SIGNALS if name != "carrying"),
     ],
     __name__,
 )  # fmt: skip
@@ -72,6 +75,7 @@ SIGNATURE = i8(
     named([f8] + [i8] * 5, Periods),
     named([PORTS[name].type for name in Wires._fields], Wires),
     i8,
+    i8,
     types.UniTuple(PORTS["disturbance"].type, MAX_DISTURBANCES),
     named([type_of(name) for name in Common._fields], Common),
     matrix,
@@ -88,6 +92,7 @@ _control_position = PORTS["position_control"].invoke
 _control_attitude = PORTS["attitude_control"].invoke
 _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
 _disturb = PORTS["disturbance"].invoke
+_decide = agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
@@ -105,11 +110,12 @@ def _follow_clock(course, rate, reference, nominal):  # type: ignore[no-untyped-
 
 
 @kernel(SIGNATURE, counted=False)
-def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycles):  # type: ignore[no-untyped-def]
+def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus, log, cycles):  # type: ignore[no-untyped-def]
     """Run physics steps ``first <= k < last``; return the step reached.
 
     It ends early, after a whole step, when a drone is judged lost: the caller regroups. The rows of ``log`` and
-    ``cycles`` are those due from ``first`` on. Of the wires ``disturbing`` the first ``disturbances`` are in use.
+    ``cycles`` are those due from ``first`` on. ``leaderless`` is 1 where each drone's agent decides, else 0. Of the wires
+    ``disturbing`` the first ``disturbances`` are in use.
     """
     dt = every.step
     n = bus.tensions.shape[0]
@@ -131,7 +137,14 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
 
         if k % every.allocation == 0:
             row = k // every.allocation - first_cycle
-            if bus.allocator_up[0] != 0.0:
+            if leaderless:  # nobody answers for all: what an allocator says of itself is not known
+                begin = monotonic_ns()
+                cycle = k // every.allocation
+                _decide(wires.network, wires.agents, bus, cycle, t, every.allocation * dt)
+                end = monotonic_ns()
+                cycles[row, :] = np.nan
+                cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9
+            elif bus.allocator_up[0] != 0.0:
                 begin = monotonic_ns()
                 status = _allocate(wires.allocation, k, t, every.allocation * dt)
                 end = monotonic_ns()
@@ -143,7 +156,8 @@ def advance(first, last, every, wires, disturbances, disturbing, bus, log, cycle
                 cycles[row, :] = np.nan
                 cycles[row, 0] = _SILENT
 
-        _transmit(wires.link, k, t, dt)
+        if not leaderless:
+            _transmit(wires.link, k, t, dt)
 
         if k % every.position_control == 0:
             _control_position(wires.position_control, k, t, every.position_control * dt)
@@ -176,6 +190,7 @@ class Circuit:
     """All that the loop calls, wired to one bus."""
 
     wires: Any
+    leaderless: bool
     disturbances: tuple[Wire, ...]
     common: Any
 
@@ -187,18 +202,19 @@ class Circuit:
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """As :func:`advance` takes them, compiled or not."""
+        leaderless, used = int(self.leaderless), len(self.disturbances)
         if not self.compiled:
-            return self.wires, len(self.disturbances), self.disturbances, self.common
+            return self.wires, leaderless, used, self.disturbances, self.common
         wires = type(self.wires)(*(wire.compiled() for wire in self.wires))
-        port, used = PORTS["disturbance"], [wire.compiled() for wire in self.disturbances]
+        port, found = PORTS["disturbance"], [wire.compiled() for wire in self.disturbances]
         spare = port.wire(push.Push.kernel, np.zeros(0), np.zeros(0), port.signals(1)).compiled()
-        filled = (*used, *[spare] * (MAX_DISTURBANCES - len(used)))
-        return wires, len(used), filled, self.common
+        filled = (*found, *[spare] * (MAX_DISTURBANCES - used))
+        return wires, leaderless, used, filled, self.common
 
 
 def circuit(
     bus: Any,
-    parts: Mapping[str, type],
+    parts: Mapping[str, Any],
     keys: Mapping[str, int],
     params: Mapping[str, Array],
     memory: Mapping[str, Array],
@@ -215,11 +231,11 @@ def circuit(
     signals = bus._asdict()
     # The reference writes along its clock, into arrays of its own; the loop makes those of the bus of them.
     course = {name: signals[name].copy() for name in PORTS["reference"].writes}
+    own = {"reference": signals | course, "agents": agents.first_of(signals)}
     wires = {
         name: PORTS[name].wire(
             _checked(layer, parts[layer], function, PORTS[name].signature),
-            params[layer], memory[layer], signals | course if name == "reference" else signals,
-            key=keys[layer],
+            params[layer], memory[layer], own.get(name, signals), key=keys[layer],
         )
         for name, (layer, function) in FUNCTIONS.items()
     }  # fmt: skip
@@ -231,7 +247,7 @@ def circuit(
         for part, key, own, kept in disturbances
     )
     common = Common(*(signals[name] for name in Common._fields))
-    return Circuit(Wires(**wires), others, common)
+    return Circuit(Wires(**wires), parts["agents"].decides, others, common)
 
 
 def is_compiled(function: Any) -> bool:

@@ -38,6 +38,7 @@ JIT_ENABLED: bool = not bool(config.DISABLE_JIT)
 
 f8 = types.float64
 i8 = types.int64
+u1 = types.uint8
 void = types.void
 vector = types.float64[::1]
 matrix = types.float64[:, ::1]

@@ -9,6 +9,8 @@ names, by name (``sees.estimated_load``); ``params`` and ``memory`` are the part
 and frames are those of the signals (:data:`colift.kernel.signals.SIGNALS`). What a layer writes holds, on
 entry, what it wrote last.
 
+The kernel of an agent is called for one drone at a time, with that drone's rows (:data:`colift.kernel.signals.OF_ONE`).
+
 A layer that is to see one more signal gets its name in :data:`PORTS`: one line, and no kernel that does not
 use it changes. What a layer writes is said by the table of signals: each line names its one writer.
 """
@@ -25,8 +27,8 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from colift.kernel.jit import address_of, f8, i8, matrix, tensor, vector, void
-from colift.kernel.signals import HIDDEN, LEGEND, Signal, named_tuple
+from colift.kernel.jit import address_of, f8, i8, u1, vector, void
+from colift.kernel.signals import HIDDEN, LEGEND, OF_ONE, Signal, named_tuple
 
 Array = NDArray[np.float64]
 
@@ -84,11 +86,11 @@ def _tuple(name: str, signals: Iterable[str]) -> Any:
 
 def type_of(name: str) -> Any:
     """Numba's type of the array of a signal; the bus's row is one too."""
-    return vector if name == "row" else (vector, matrix, tensor)[len(_SIGNALS[name].shape) - 1]
+    return vector if name == "row" else _array(_SIGNALS[name])
 
 
-def _type(made: Any) -> Any:
-    return named(map(type_of, made._fields), made)
+def _array(signal: Signal) -> Any:
+    return types.Array(u1 if signal.dtype is np.uint8 else f8, len(signal.shape), "C")
 
 
 def _invoke(signature: Any) -> Callable[[Wire, int, float, float], Any]:
@@ -142,6 +144,8 @@ class Port:
         Whether the kernel returns a status.
     signature : Numba signature
         For :func:`colift.kernel.jit.kernel`.
+    table : mapping of str to Signal
+        The signals by name; those of one drone for the layer whose kernels are called once for each.
     invoke : callable
         ``invoke(wire, step, time, dt)`` calls the kernel of a :class:`Wire`, from Python or from compiled code.
 
@@ -150,6 +154,7 @@ class Port:
     name: str
     sees: tuple[str, ...]
     answers: bool = False
+    table: Mapping[str, Signal] = field(default_factory=lambda: _SIGNALS, repr=False)
     writes: tuple[str, ...] = field(init=False)
     Sees: Any = field(init=False, repr=False)
     Writes: Any = field(init=False, repr=False)
@@ -158,11 +163,15 @@ class Port:
 
     def __post_init__(self) -> None:
         keep = object.__setattr__
-        keep(self, "writes", tuple(s.name for s in _SIGNALS.values() if s.writer == self.name))
+        keep(self, "writes", tuple(s.name for s in self.table.values() if s.writer == self.name))
         keep(self, "Sees", _tuple(f"{_words(self.name)}Sees", self.sees))
         keep(self, "Writes", _tuple(f"{_words(self.name)}Writes", self.writes))
         returns = i8 if self.answers else void
-        arguments = (NOW_TYPE, _type(self.Sees), vector, vector, _type(self.Writes))
+        sees, writes = (
+            named((_array(self.table[name]) for name in made._fields), made)
+            for made in (self.Sees, self.Writes)
+        )
+        arguments = (NOW_TYPE, sees, vector, vector, writes)
         keep(self, "signature", returns(*arguments))
         keep(self, "invoke", _invoke(self.signature))
 
@@ -176,9 +185,13 @@ class Port:
         """Its signals for a team of n drones: those given, for the others new arrays of their initial values."""
         if unknown := {*given} - {*self.sees, *self.writes}:
             raise TypeError(f"{self.name}: its port has no {', '.join(sorted(unknown))}")
-        found = {name: np.ascontiguousarray(value, dtype=float) for name, value in given.items()}
+        table = self.table
+        found: dict[str, Any] = {
+            name: np.ascontiguousarray(value, table[name].dtype) for name, value in given.items()
+        }
         for name in {*self.sees, *self.writes} - {*found}:
-            found[name] = np.full(_SIGNALS[name].shape_for(n), _SIGNALS[name].initial)
+            signal = table[name]
+            found[name] = np.full(signal.shape_for(n), signal.initial, signal.dtype)
         return found
 
     def wire(
@@ -215,6 +228,13 @@ PORTS: dict[str, Port] = {
         Port("load_control", sees=("estimated_load", "reference")),
         Port("allocation", sees=("force", "reference", "nominal_forces"), answers=True),
         Port("link", sees=("desired_tensions", "desired_directions")),
+        Port("network", sees=("outboxes",)),
+        Port(
+            "agents",
+            sees=("wish", "steady_wish", "number", "members", "inbox", "heard", "evidence"),
+            answers=True,
+            table={signal.name: signal for signal in OF_ONE},
+        ),
         Port(
             "position_control",
             sees=(*_named("estimated")[1:], "wanted_ends", "nominal_forces", *_RECEIVED),

@@ -39,6 +39,8 @@ class Signal:
     """Recorded in each ``"row"`` of the log, or for each ``"allocation"``."""
     writer: str = ""
     """Port whose kernel writes it (:data:`colift.kernel.ports.PORTS`); none for what faults change or the loop writes."""
+    dtype: type = np.float64
+    """Of its array; bytes are ``np.uint8``."""
 
     def shape_for(self, n: int) -> tuple[int, ...]:
         """Shape with the number of drones filled in."""
@@ -92,6 +94,7 @@ SIGNALS = (
     Signal("motor_health", ("n", 4), "1", "-", "-", "share of its thrust that each motor still gives", initial=1.0),
     Signal("stuck", ("n+1",), "1", "-", "-", "1 where the sensors of a drone or, last, the load repeat their last value"),
     Signal("allocator_up", (1,), "1", "-", "-", "1 where the allocator answers, 0 where it is silent", initial=1.0),
+    Signal("agent_status", ("n",), "1", "-", "-", "status of each drone's own agent", writer="agents"),
     Signal("phase", (1,), "1", "-", "-", "what the supervisor is about; 0 is flying", writer="supervision"),
     Signal("clock", (2,), "s, 1", "-", "-", "time that the reference is given, and how fast it runs: 1 as time does, 0 held", initial=0.0, writer="supervision"),
 )  # fmt: skip
@@ -130,8 +133,34 @@ ENDS = (
 )  # fmt: skip
 """Not recorded, as they follow from the load (:mod:`colift.kernel.load`); the loop writes those without a writer."""
 
-HIDDEN = (ANSWER, NOMINAL, *ENDS)
+MESSAGE = 30
+"""Length of what a drone broadcasts, bytes: what one packet of a Crazyflie's radio holds."""
+
+MESSAGES = (
+    Signal("steady_force", (3,), "N", "-", "world", "part of the wanted force that is not feedback of the moment: planned and learned", writer="load_control"),
+    Signal("members", ("n",), "1", "-", "-", "number in the mission of each drone that flies"),
+    Signal("outboxes", ("n", MESSAGE), "-", "-", "-", "message that each drone broadcasts", writer="agents", dtype=np.uint8),
+    Signal("inboxes", ("n", "n", MESSAGE), "-", "-", "-", "newest message that each drone has of each", writer="network", dtype=np.uint8),
+    Signal("heard", ("n", "n"), "1", "-", "-", "1 where a drone's message of another is new in this cycle", writer="network"),
+)  # fmt: skip
+"""Of a team without a leader; not recorded."""
+
+HIDDEN = (ANSWER, NOMINAL, *ENDS, *MESSAGES)
 """Signals of the bus that stand outside of its row."""
+
+OF_ONE = (
+    Signal("wish", (3,), "N", "-", "world", "total force on the load that this drone wants"),
+    Signal("steady_wish", (3,), "N", "-", "world", "the part of it that is not feedback of the moment"),
+    Signal("number", (1,), "1", "-", "-", "this drone's number in the mission"),
+    Signal("members", ("n",), "1", "-", "-", "the numbers of the team, in the order of what has one row a drone"),
+    Signal("inbox", ("n", MESSAGE), "-", "-", "-", "newest message of each drone; the own row is not used", dtype=np.uint8),
+    Signal("heard", ("n",), "1", "-", "-", "1 for each drone whose message is new"),
+    Signal("evidence", ("n",), "1", "-", "-", "1 for each drone that is taken to carry"),
+    Signal("tension", (1,), "N", "-", "-", "tension that this drone gives its cable", writer="agents"),
+    Signal("direction", (3,), "1", "-", "world", "unit direction to the load that it gives it", writer="agents"),
+    Signal("outbox", (MESSAGE,), "-", "-", "-", "message to all others", writer="agents", dtype=np.uint8),
+)  # fmt: skip
+"""What one drone's agent sees and writes: rows of signals of the bus (:mod:`colift.flight.agents`)."""
 
 CYCLE_SIGNALS = tuple(
     replace(signal, each="allocation")
@@ -171,7 +200,7 @@ def make_bus(n: int) -> Any:
     where = columns(n)
     row = np.zeros(max(part.stop for part in where.values()))
     views = {s.name: row[where[s.name]].reshape(s.shape_for(n)) for s in SIGNALS}
-    views |= {s.name: np.empty(s.shape_for(n)) for s in HIDDEN}
+    views |= {s.name: np.empty(s.shape_for(n), s.dtype) for s in HIDDEN}
     for s in (*HIDDEN, *SIGNALS):
         views[s.name][:] = s.initial
     return Bus(row=row, **views)

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import Field, SerializeAsAny
 
+from colift.control.agents.base import AgentPart
 from colift.control.allocation.base import AllocatorPart
 from colift.control.attitude_control.base import AttitudeControlPart
 from colift.control.detection.base import DetectionPart
@@ -20,6 +21,7 @@ from colift.world.actuation.base import ActuationPart
 from colift.world.disturbance.base import DisturbancePart
 from colift.world.fault.base import FaultPart
 from colift.world.link.base import LinkPart
+from colift.world.network.base import NetworkPart
 from colift.world.plant.base import PlantPart
 from colift.world.sensing.base import SensingPart
 
@@ -42,6 +44,8 @@ class Mission(Described):
     load_control: SerializeAsAny[LoadControlPart]
     allocation: SerializeAsAny[AllocatorPart]
     link: SerializeAsAny[LinkPart]
+    network: SerializeAsAny[NetworkPart]
+    agents: SerializeAsAny[AgentPart]
     position_control: SerializeAsAny[PositionControlPart]
     attitude_control: SerializeAsAny[AttitudeControlPart]
     actuation: SerializeAsAny[ActuationPart]

@@ -42,6 +42,10 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             - params[P.k_d + k] * e_dot
             - params[P.k_i + k] * memory[S]
         )
+        writes.steady_force[k] = (
+            sign * m_L * (gravity + params[P.feed_forward] * reference[2, k])
+            - params[P.k_i + k] * memory[S]
+        )
 
 
 class Pid(LoadControlPart):

@@ -1,0 +1,56 @@
+"""One cycle of a team without a leader: messages are carried, then each drone's agent decides.
+
+An agent's kernel is called for one drone, with that drone's rows of the bus. Nothing of it runs in a flight whose allocator
+decides for all.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from numba.extending import register_jitable
+
+from colift.kernel.ports import PORTS, Wire
+
+Sees, Writes = PORTS["agents"].Sees, PORTS["agents"].Writes
+_agree, _carry = PORTS["agents"].invoke, PORTS["network"].invoke
+
+SIGNALS = (
+    "force", "steady_force", "members", "inboxes", "heard", "carrying", "desired_tensions",
+    "desired_directions", "outboxes", "agent_status", "received_tensions", "received_directions",
+)  # fmt: skip
+"""What a cycle takes and gives of the bus, beside what the network does."""
+
+
+@register_jitable
+def rows_of(bus, i):  # type: ignore[no-untyped-def]
+    """What drone i sees and what it writes."""
+    sees = Sees(
+        bus.force, bus.steady_force, bus.members[i : i + 1], bus.members, bus.inboxes[i],
+        bus.heard[i], bus.carrying,
+    )  # fmt: skip
+    writes = Writes(bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i])
+    return sees, writes
+
+
+@register_jitable
+def decide(network, agents, bus, cycle, time, dt):  # type: ignore[no-untyped-def]
+    """Carry what the drones said in the last cycle; let each decide and fly what it decides at once."""
+    _carry(network, cycle, time, dt)
+    n = bus.members.shape[0]
+    width = agents.memory.shape[0] // n
+    for i in range(n):
+        sees, writes = rows_of(bus, i)
+        own = agents.memory[width * i : width * (i + 1)]
+        wire = Wire(agents.kernel, agents.key, agents.params, own, sees, writes)
+        bus.agent_status[i] = _agree(wire, cycle, time, dt)
+        bus.received_tensions[i] = bus.desired_tensions[i]
+        for k in range(3):
+            bus.received_directions[i, k] = bus.desired_directions[i, k]
+
+
+def first_of(signals: dict[str, Any]) -> dict[str, Any]:
+    """By name what the first drone's agent sees and writes: how the layer is wired until a cycle puts in another's."""
+    sees, writes = rows_of(SimpleNamespace(**signals), 0)
+    return {**sees._asdict(), **writes._asdict()}

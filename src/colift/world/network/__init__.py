@@ -1,0 +1,1 @@
+"""Network: how messages get from each drone to each other; one file per model."""
