@@ -12,7 +12,7 @@ import importlib.util
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -233,6 +233,21 @@ class Part(BaseModel, metaclass=Refusing):
     def check_timing(self, step: float, duration: float) -> list[tuple[str, str]]:
         """Problems with the physics step or the length of the flight (s), as for :meth:`check`."""
         return []
+
+
+AnyPart = TypeVar("AnyPart", bound=Part)
+
+
+def driven(part: type[AnyPart]) -> type[AnyPart]:
+    """Give a part the kernel that does nothing: what its layer writes stays what :meth:`colift.flight.flight.Flight.act` set it to."""
+    from colift.kernel.jit import kernel
+    from colift.kernel.ports import PORTS, hold, hold_answer
+
+    port = PORTS[part.layer]
+    written = ", ".join(f"``{name}``" for name in port.writes)
+    part.kernel = kernel(port.signature)(hold_answer if port.answers else hold)
+    part.__doc__ = f"Stays what :meth:`colift.flight.flight.Flight.act` set it to: {written}."
+    return part
 
 
 def timing_problems(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from colift.lazy import lookup
 
 if TYPE_CHECKING:
     from colift.catalogue import mission_names
@@ -19,10 +20,4 @@ _HOMES = {
 
 __all__ = ["Mission", "load_mission", "mission_names"]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'colift.mission' has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
+__getattr__ = lookup(__name__, _HOMES)

@@ -1,13 +1,9 @@
 """Driven from outside: by a person, a learner, another program."""
 
-from __future__ import annotations
-
-from colift.control.allocation.base import SIGNATURE, AllocatorPart
-from colift.kernel.jit import kernel
-from colift.kernel.ports import hold_answer
+from colift.control.allocation.base import AllocatorPart
+from colift.part import driven
 
 
+@driven
 class External(AllocatorPart):
-    """Writes nothing: ``desired_tensions`` and ``desired_directions`` stay what :meth:`colift.flight.flight.Flight.act` set them to."""
-
-    kernel = kernel(SIGNATURE)(hold_answer)
+    """What the layer writes is set by :meth:`colift.flight.flight.Flight.act`."""
