@@ -1,14 +1,16 @@
 """What the rooms of ``src/colift`` import of each other: ``python docs/figures/rooms.py``.
 
 Writes ``rooms.svg`` beside this file and the table of imports in ``where-things-live.md``, both from the imports that grimp,
-the tool below import-linter, finds in the source. The floors are those of the first contract in ``pyproject.toml``.
+the tool below import-linter, finds in the source. The floors are those of the first contract in ``pyproject.toml``. Graphviz (``dot``, of
+the Debian package graphviz) lays the drawing out.
 """
 
+import html
+import re
+import subprocess
 import tomllib
 from collections.abc import Mapping
-from itertools import product
 from pathlib import Path
-from typing import NamedTuple
 
 import grimp
 from pages import fill, table
@@ -39,30 +41,25 @@ SAYS = {
     "kernel": "signals, ports, compiling",
     "interrupts": "Ctrl-C",
     "threads": "of the BLAS",
+    "lazy": "names on first use",
 }
 """A few words for each room."""
 
-# Sizes in units of the drawing.
-LEFT, WIDE, LANE = 52.0, 528.0, 16.0
-GAP, LOW, LINE = 30.0, 50.0, 15.5
-SPANS = {
-    "control": (0.0, 0.49), "world": (0.51, 1.0), "extras": (0.0, 0.3), "team": (0.36, 0.66),
-    "catalogue": (0.7, 1.0), "wording": (0.36, 0.66), "interrupts": (0.0, 0.3), "threads": (0.0, 0.3),
-    "kernel": (0.32, 0.68), "errors": (0.7, 1.0),
-}  # fmt: skip
-"""Where a room begins and ends that does not fill its floor."""
-STACKED = {"interrupts": 0, "threads": 1}
-"""Rooms that stand one above the other on a floor."""
+SMALL = ("interrupts", "lazy", "threads")
+"""Rooms that few others need: one below the other, although on one floor."""
+SPINE = ("cli", "show", "study", "flight", "record", "mission")
+"""Rooms that stand straight above each other."""
 
-
-class Box(NamedTuple):
-    """Where a room stands."""
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-    floor: int
+STYLE = """<style>
+.node path{fill:var(--color-background-secondary,#f8f9fb);stroke:currentColor;stroke-width:1.4}
+.wing path{stroke:var(--color-brand-primary,#2962ff);stroke-width:2.6}
+.node text{fill:currentColor;font-family:sans-serif;font-size:14px}
+.node text:first-of-type{font-weight:600;font-size:16px}
+.wing text:nth-of-type(n+3){font-family:monospace;font-size:13px}
+.edge path{stroke:currentColor;stroke-width:1.2}
+.edge polygon{fill:currentColor;stroke:currentColor}
+</style>"""
+"""Colours of the page, light or dark."""
 
 
 def floors() -> list[list[str]]:
@@ -108,78 +105,48 @@ def layers_of(room: str) -> list[str]:
     return [layer for layer, wing in WINGS.items() if wing == room]
 
 
-def boxes() -> dict[str, Box]:
-    """Where every room stands."""
-    placed, top = {}, 10.0
-    for floor, rooms in enumerate(floors()):
-        stacks = max(STACKED.get(room, 0) for room in rooms)
-        high = LOW + stacks * (LOW + 8.0)
-        if layers := max(len(layers_of(room)) for room in rooms):
-            high += LINE * layers + 6.0
+def dot(found: Imports) -> str:
+    """The graph in the language of Graphviz: a rank for each floor."""
+    lines = [
+        "digraph rooms {",
+        "graph [bgcolor=transparent, nodesep=0.2, ranksep=0.32, margin=0.05]",
+        'node [shape=box, style=rounded, width=1.1, fontname="Helvetica,Arial,sans-serif", margin="0.16,0.07"]',
+        "edge [arrowsize=0.7]",
+    ]
+    for rooms in floors():
         for room in rooms:
-            begin, end = SPANS.get(room, (0.0, 1.0))
-            above = top + STACKED.get(room, 0) * (LOW + 8.0)
-            below = above + LOW if room in STACKED else top + high
-            placed[room] = Box(LEFT + begin * WIDE, above, LEFT + end * WIDE, below, floor)
-        top += high + GAP
-    return placed
-
-
-def route(start: Box, end: Box, others: list[Box], lane: float) -> str:
-    """An arrow's path: straight down where nothing stands between, else by an elbow or a lane on the left."""
-    left, right = max(start.left, end.left), min(start.right, end.right)
-    between = [box for box in others if box.top >= start.bottom and box.bottom <= end.top]
-    steps = [left + (right - left) * (0.5 + sign * k / 40) for k in range(19) for sign in (1, -1)]
-    for room, x in product((14.0, 5.0), steps if right - left > 20.0 else ()):
-        if all(x < box.left - room or x > box.right + room for box in between):
-            return f"M{x:g} {start.bottom:g} V{end.top - 1:g}"
-    if end.floor == start.floor + 1:
-        a, b = (start.left + start.right) / 2, (end.left + end.right) / 2
-        return f"M{a:g} {start.bottom:g} V{start.bottom + GAP / 2:g} H{b:g} V{end.top - 1:g}"
-    a, b = (start.top + start.bottom) / 2, (end.top + end.bottom) / 2
-    return f"M{start.left:g} {a:g} H{lane:g} V{b:g} H{end.left - 1:g}"
+            layers = [f"{layer}/" for layer in layers_of(room)]
+            kind = "wing" if layers else "room"
+            text = "\\n".join([room, SAYS[room], *layers])
+            group = SPINE if room in SPINE else SMALL if room in SMALL else (room,)
+            lines.append(f'{room} [class={kind}, group={group[0]}, label="{text}"]')
+        lines.append(f"{{rank=same {' '.join(room for room in rooms if room not in SMALL)}}}")
+    lines += [f"{room} -> {other}" for room, other in direct(found)]
+    lines.append(f"{' -> '.join(SMALL)} [style=invis]")
+    return "\n".join([*lines, "}", ""])
 
 
 def drawing(found: Imports) -> str:
-    """The whole SVG."""
-    placed = boxes()
-    shapes, lane = [], LEFT - LANE
-    for room, other in direct(found):
-        start, end = placed[room], placed[other]
-        rest = [box for name, box in placed.items() if name not in (room, other)]
-        path = route(start, end, rest, lane)
-        lane -= LANE if path.count("H") == 2 else 0.0
-        shapes.append(
-            f'<path class="r-line" marker-end="url(#r-a)" d="{path}"><title>{room} imports {other}</title></path>'
-        )
-    for room, box in placed.items():
-        middle = (box.left + box.right) / 2
-        wing = layers_of(room)
-        kind = "r-wing" if wing else "r-box"
-        shapes.append(
-            f'<rect class="{kind}" x="{box.left:g}" y="{box.top:g}" width="{box.right - box.left:g}"'
-            f' height="{box.bottom - box.top:g}" rx="6"/>'
-            f'<text class="r-t" x="{middle:g}" y="{box.top + 21:g}">{room}</text>'
-            f'<text class="r-s" x="{middle:g}" y="{box.top + 40:g}">{SAYS[room]}</text>'
-        )
-        for k, layer in enumerate(wing):
-            y = box.top + 62 + LINE * k
-            shapes.append(f'<text class="r-f" x="{middle:g}" y="{y:g}">{layer}/</text>')
-    size = f"{LEFT + WIDE + 10:g} {max(box.bottom for box in placed.values()) + 10:g}"
-    return "\n".join([HEAD.replace("SIZE", size), *shapes, "</svg>", ""])
+    """The whole SVG, as wide as the page, laid out by Graphviz."""
+    made = subprocess.run(
+        ["dot", "-Tsvg"], input=dot(found), text=True, capture_output=True, check=True
+    ).stdout
+    (version,) = re.findall(r"graphviz version (\S+)", made)
+    (box,) = re.findall(r'viewBox="([^"]*)"', made)
+    body = made[made.index(">", made.index("<svg")) + 1 :]
+    body = re.sub(r"<!--.*?-->\n", "", body, flags=re.DOTALL)
+    return "\n".join([HEAD.format(version=version, box=box), STYLE, body.lstrip()])
 
 
-HEAD = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 SIZE" role="img" aria-label="Rooms of src/colift from top to bottom; arrows go from a room to those that it imports">
-<style>
-.r-box{fill:var(--color-background-secondary,#f8f9fb);stroke:currentColor;stroke-width:1.4}
-.r-wing{fill:var(--color-background-secondary,#f8f9fb);stroke:var(--color-brand-primary,#2962ff);stroke-width:2.6}
-.r-line{fill:none;stroke:currentColor;stroke-width:1.4}
-.r-t{font:600 16px sans-serif;fill:currentColor;text-anchor:middle}
-.r-s{font:14px sans-serif;fill:currentColor;text-anchor:middle;opacity:.9}
-.r-f{font:13px monospace;fill:currentColor;text-anchor:middle;opacity:.9}
-.r-head{fill:currentColor}
-</style>
-<defs><marker id="r-a" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="8" markerHeight="8" orient="auto"><path class="r-head" d="M0 1 L10 5 L0 9 z"/></marker></defs>"""
+def drawn(svg: str) -> list[tuple[str, str]]:
+    """The arrows of a drawing."""
+    titles = re.findall(r"<title>(.*?)</title>", svg)
+    arrows = [html.unescape(title).split("->") for title in titles if "&gt;" in title]
+    return [(room, other) for room, other in arrows]
+
+
+HEAD = """<!-- laid out by Graphviz {version} -->
+<svg xmlns="http://www.w3.org/2000/svg" viewBox="{box}" role="img" aria-label="Rooms of src/colift from top to bottom; arrows go from a room to those that it imports">"""
 
 
 def listing(found: Imports) -> str:
