@@ -94,7 +94,7 @@ def cell(content: str | nodes.Node) -> nodes.entry:
 
 WIDTHS = {
     "symbol": 10, "name": 24, "shape": 11, "unit": 11, "frame": 11, "meaning": 40, "default": 14,
-    "field": 16, "layer": 14, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
+    "field": 16, "layer": 14, "agent": 10, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
 }  # fmt: skip
 
 
@@ -138,7 +138,7 @@ class SignalTable(SphinxDirective):
                 ["writes" if s.writer else "sees", code(s.name), code(shape_text(s)), s.meaning]
                 for s in OF_ONE
             ]
-            return [table(["", "name", "shape", "meaning"], mine)]
+            return [table(["agent", "name", "shape", "meaning"], mine)]
         rows = [
             [math(latex(s.symbol)), code(s.name), code(shape_text(s)), s.unit, s.frame, s.meaning]
             for s in (*SIGNALS, *CYCLE_SIGNALS)
