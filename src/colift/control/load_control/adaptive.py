@@ -54,7 +54,6 @@ def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         e = load[0, k] - reference[0, k]
         e_dot = load[1, k] - reference[1, k]
         known = m_hat * g if k == 2 else memory[lean + k]
-        writes.steady_force[k] = known + m_hat * reference[2, k]
         u_L[k] = known + m_hat * reference[2, k] - k_p * e - k_d * e_dot
     # Keep the cables taut and the formation upright: a force up, within a cone.
     u_L[2] = max(u_L[2], 0.3 * m_hat * g)
@@ -62,6 +61,10 @@ def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     if across > tangent * u_L[2]:
         u_L[0] *= tangent * u_L[2] / across
         u_L[1] *= tangent * u_L[2] / across
+    grown = 1.0 + memory[M.mass]
+    for k in range(3):
+        steady = m * g * grown if k == 2 else memory[lean + k]
+        writes.steady_force[k] = steady + m * reference[2, k] * grown
 
 
 class Adaptive(LoadControlPart, Delays):
