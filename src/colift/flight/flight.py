@@ -268,12 +268,13 @@ class Flight:
         bus = self.bus
         for signal in (*HIDDEN, *SIGNALS):
             now, before = getattr(bus, signal.name), getattr(old.bus, signal.name)
-            if signal.shape[0] in {"n", "n+1"}:
+            if signal.shape[:2] == ("n", "n"):
+                now[np.ix_(~new, ~new)] = before[np.ix_(stay, stay)]
+            elif signal.shape[0] in {"n", "n+1"}:
                 now[: team.n][~new] = before[stay]
                 now[team.n :] = before[len(old.drones) :]
             else:
                 now[:] = before
-        bus.outboxes[~new] = old.bus.outboxes[stay]
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
         self.wires.reference.writes.reference[:] = old.circuit.wires.reference.writes.reference
 
