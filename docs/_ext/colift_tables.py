@@ -33,6 +33,8 @@ TEAM = (
     (r"J_i", "inertias", "(n, 3)", "kg m^2", "body"),
     ("L_i", "cable_lengths", "(n,)", "m", "-"),
     ("g", "gravity", "()", "m/s^2", "-z of the world"),
+    (r"f_{i,\max}", "max_thrusts", "(n,)", "N", "-"),
+    (r"a_i", "arms", "(n,)", "m", "-"),
 )
 GAINS = (
     (r"k_{pL}", "load_control", "pid", "k_p", "N/m", "world axes"),

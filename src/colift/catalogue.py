@@ -1,4 +1,4 @@
-"""What there is, by name: layers, their parts, the shipped missions. Nothing is imported or compiled for it."""
+"""What there is, by name: layers, their parts, shipped missions, vehicles. Nothing is imported or compiled for it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import importlib.resources
 import os
 import pkgutil
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from colift.errors import MissionError, Problem, UnknownNameError
+from colift.errors import MissionError, Problem, UnknownNameError, VehicleError
 
 WINGS = {
     "sensing": "world",
@@ -63,6 +64,10 @@ DEFAULT_KINDS = {
 """Parts of the layers that a mission need not name."""
 
 
+VEHICLE = "vehicle"
+"""Suffix of the group of entry points for drones that other packages bring."""
+
+
 def own_names(layer: str) -> list[str]:
     """Names of the parts of a layer that colift brings."""
     if layer not in FOLDERS:
@@ -90,7 +95,7 @@ def _plugged() -> dict[str, dict[str, importlib.metadata.EntryPoint]]:
     points = importlib.metadata.entry_points()
     return {
         layer: {point.name: point for point in points.select(group=f"colift.{layer}")}
-        for layer in FOLDERS
+        for layer in (*FOLDERS, VEHICLE)
     }
 
 
@@ -100,6 +105,51 @@ def mission_names() -> list[str]:
     return sorted(
         f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")
     )
+
+
+_VEHICLES = Path(__file__).parent / "team" / "vehicles"
+
+
+def own_vehicle_names() -> list[str]:
+    """Names of the drones whose numbers colift brings."""
+    return sorted(file.stem for file in _VEHICLES.glob("*.toml"))
+
+
+def vehicle_names() -> list[str]:
+    """Names of the drones that are known by their numbers: colift's and other packages'."""
+    return sorted({*own_vehicle_names(), *plugged(VEHICLE)})
+
+
+def read_vehicle(source: str) -> dict[str, Any]:
+    """The raw table of a drone: from a name, or from the path of a TOML file (whose name ends with .toml).
+
+    Another package's entry point holds such a table, or the path of one.
+
+    Raises
+    ------
+    UnknownNameError
+        If it is neither.
+    VehicleError
+        If the file cannot be read or is not TOML.
+
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        path = _VEHICLES / f"{source}.toml"
+        if source not in own_vehicle_names():
+            point = plugged(VEHICLE).get(source)
+            if point is None:
+                raise UnknownNameError("vehicle", source, vehicle_names())
+            found = point.load()
+            if isinstance(found, Mapping):
+                return dict(found)
+            path = Path(found)
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise VehicleError(f"{path}: cannot be read: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise VehicleError(f"{path}: is not valid TOML: {error}") from error
 
 
 def read_source(source: str | Path) -> tuple[str, dict[str, Any]]:

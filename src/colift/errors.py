@@ -77,6 +77,10 @@ class MissionError(ColiftError):
         return f"{self.source}: {count}\n{lines}"
 
 
+class VehicleError(ColiftError):
+    """The numbers of a drone cannot be read or are none that a drone can have; names the file and the field."""
+
+
 class MissingExtraError(ColiftError):
     """A part calls a package that is not installed; the message says how to install it."""
 

@@ -1,5 +1,6 @@
 """What flies: drones, cables and load, and the geometry of their formations."""
 
 from colift.team.bodies import Team as Team
+from colift.team.vehicles import Vehicle as Vehicle
 
-__all__ = ["Team"]
+__all__ = ["Team", "Vehicle"]

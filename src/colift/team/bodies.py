@@ -2,15 +2,45 @@
 
 from __future__ import annotations
 
+import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from colift.errors import SettingError
+from colift.team.vehicles import Vehicle, complete, impossible, vehicle_of
 from colift.wording import numbers, shown
+
+Numbers = NDArray[np.float64]
+
+PLACES = {
+    "mass": "masses", "inertia": "inertias", "max_thrust": "max_thrusts", "motor_lag": "motor_lags", "arm": "arms",
+    "radius": "radii", "rotor_radius": "rotor_radii", "rotors": "rotors", "torque_ratio": "torque_ratios",
+    "rotor_drag": "rotor_drags", "energy": "energies", "efficiency": "efficiencies",
+}  # fmt: skip
+"""Of each number of a drone, the team's array."""
+
+UNKNOWN = {name: math.inf if name == "max_thrusts" else math.nan for name in PLACES.values()}
+"""What stands where a number is not known: no limit is known to the thrust, all else is not a number."""
+
+
+class DroneNumbers(TypedDict, total=False):
+    """Numbers of a drone that may be left out, as keywords; see :class:`colift.team.vehicles.Vehicle`."""
+
+    max_thrust: float
+    motor_lag: float
+    arm: float
+    radius: float
+    rotor_radius: float
+    rotors: int
+    torque_ratio: float
+    rotor_drag: float
+    energy: float
+    efficiency: float
 
 
 @dataclass(frozen=True)
@@ -29,6 +59,22 @@ class Team:
         m.
     gravity : float
         m/s^2, along -z of the world frame.
+    max_thrusts : (n,) array
+        Largest steady thrust of each drone, all its rotors together, N; inf where it is not known.
+    motor_lags : (n,) array
+        Time constant of the motors' thrust, s. NaN where it is not known, as in all that follow.
+    arms, radii, rotor_radii : (n,) array
+        From a drone's centre to a rotor's axis, and to the outermost tip; radius of one rotor; m.
+    rotors : (n,) array
+        Number of rotors.
+    torque_ratios : (n,) array
+        Torque about a motor's axis per thrust, m.
+    rotor_drags : (n,) array
+        Force in the rotors' plane per thrust and speed across it, s/m.
+    energies : (n,) array
+        Of the full batteries, J.
+    efficiencies : (n,) array
+        Ideal power of the rotors in hover over the battery's power.
 
     Raises
     ------
@@ -42,6 +88,16 @@ class Team:
     inertias: NDArray[np.float64]
     cable_lengths: NDArray[np.float64]
     gravity: float = 9.81
+    max_thrusts: NDArray[np.float64] = None  # type: ignore[assignment]  # what is left out becomes an array
+    motor_lags: NDArray[np.float64] = None  # type: ignore[assignment]
+    arms: NDArray[np.float64] = None  # type: ignore[assignment]
+    radii: NDArray[np.float64] = None  # type: ignore[assignment]
+    rotor_radii: NDArray[np.float64] = None  # type: ignore[assignment]
+    rotors: NDArray[np.float64] = None  # type: ignore[assignment]
+    torque_ratios: NDArray[np.float64] = None  # type: ignore[assignment]
+    rotor_drags: NDArray[np.float64] = None  # type: ignore[assignment]
+    energies: NDArray[np.float64] = None  # type: ignore[assignment]
+    efficiencies: NDArray[np.float64] = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         n = np.size(self.masses)
@@ -49,6 +105,10 @@ class Team:
             raise SettingError.of("masses", shown(self.masses), "must be at least 1 number")
         for name, shape in (("masses", (n,)), ("inertias", (n, 3)), ("cable_lengths", (n,))):
             value = numbers(name, getattr(self, name), shape, above=0.0)
+            object.__setattr__(self, name, value)
+        for name in _OPTIONAL:
+            value = getattr(self, name)
+            value = np.full(n, UNKNOWN[name]) if value is None else _known(name, value, n)
             object.__setattr__(self, name, value)
         load_mass = numbers("load_mass", self.load_mass, (), above=0.0)
         object.__setattr__(self, "load_mass", float(load_mass))
@@ -66,10 +126,13 @@ class Team:
             raise SettingError.of("drones", shown(chosen), f"must be some of 0 to {self.n - 1}")
         return replace(
             self,
-            masses=self.masses[chosen],
-            inertias=self.inertias[chosen],
-            cable_lengths=self.cable_lengths[chosen],
+            **{name: getattr(self, name)[chosen] for name in (*PLACES.values(), "cable_lengths")},
         )
+
+    @property
+    def disc_areas(self) -> NDArray[np.float64]:
+        """Area that the rotors of each drone sweep (n,), m^2, for momentum theory; NaN where it is not known."""
+        return np.asarray(self.rotors * np.pi * self.rotor_radii**2)
 
     def hover_thrusts(
         self, tensions: NDArray[np.float64], directions: NDArray[np.float64]
@@ -94,22 +157,87 @@ class Team:
         n: int,
         *,
         load_mass: float = 0.225,
-        mass: float = 0.5,
-        inertia: tuple[float, float, float] = (0.021, 0.0187, 0.0397),
+        mass: float | None = None,
+        inertia: tuple[float, float, float] | None = None,
         cable_length: float = 1.0,
         gravity: float = 9.81,
+        vehicle: str | Vehicle | None = None,
+        **further: Unpack[DroneNumbers],
     ) -> Team:
-        """n equal drones; the defaults are the paper's (section 4)."""
+        """n equal drones of a vehicle, with some of its numbers replaced; without one, the paper's (section 4).
+
+        Without a vehicle, the inertia is estimated where ``arm`` is given.
+        """
         try:
             n = operator.index(n)  # any kind of integer, NumPy's too
         except TypeError:
             raise SettingError.of("n", shown(n), "must be a whole number") from None
         if n < 1:
             raise SettingError.of("n", n, "must be at least 1")
-        return cls(
+        given: dict[str, Any] = dict(further)
+        if mass is not None:
+            given["mass"] = float(numbers("mass", mass, (), above=0.0))
+        if inertia is not None:
+            given["inertia"] = numbers("inertia", inertia, (3,), above=0.0).tolist()
+        body = _one(given, vehicle_of(vehicle))
+        return cls.of_bodies(
+            [body] * n,
             load_mass=load_mass,
-            masses=np.full(n, numbers("mass", mass, (), above=0.0)),
-            inertias=np.tile(numbers("inertia", inertia, (3,), above=0.0), (n, 1)),
             cable_lengths=np.full(n, numbers("cable_length", cable_length, (), above=0.0)),
             gravity=gravity,
         )
+
+    @classmethod
+    def of_vehicles(
+        cls,
+        vehicles: Sequence[str | Vehicle],
+        *,
+        load_mass: float,
+        cable_lengths: ArrayLike = 1.0,
+        gravity: float = 9.81,
+    ) -> Team:
+        """The team of these vehicles, by name or with numbers of their own; one cable length (m), or one each."""
+        bodies = [_one({}, vehicle_of(vehicle)) for vehicle in vehicles]
+        if not bodies:
+            raise SettingError.of("vehicles", "[]", "must name at least 1")
+        lengths = numbers("cable_lengths", cable_lengths, np.shape(cable_lengths), above=0.0)
+        if lengths.ndim == 0:
+            lengths = np.full(len(bodies), lengths)
+        return cls.of_bodies(bodies, load_mass=load_mass, cable_lengths=lengths, gravity=gravity)
+
+    @classmethod
+    def of_bodies(
+        cls,
+        bodies: Sequence[Mapping[str, Any]],
+        *,
+        load_mass: float,
+        cable_lengths: NDArray[np.float64],
+        gravity: float = 9.81,
+    ) -> Team:
+        """The team of drones with these numbers, by field of :class:`colift.team.vehicles.Vehicle`."""
+        arrays: dict[str, Any] = {
+            place: np.array([body.get(name, UNKNOWN[place]) for body in bodies], dtype=float)
+            for name, place in PLACES.items()
+        }
+        return cls(load_mass=load_mass, cable_lengths=cable_lengths, gravity=gravity, **arrays)
+
+
+_OPTIONAL = tuple(name for name in PLACES.values() if name not in ("masses", "inertias"))
+
+
+def _known(name: str, value: ArrayLike, n: int) -> Numbers:
+    """Numbers (n,) that are not negative where they are known."""
+    found = numbers(name, value, (n,), finite=False)
+    if np.any(found < 0.0):
+        raise SettingError.of(name, shown(found.tolist()), "must be at least 0, or not known")
+    return found
+
+
+def _one(given: Mapping[str, Any], vehicle: Vehicle | None) -> dict[str, Any]:
+    """The numbers of a drone, each checked as a vehicle's are."""
+    body = complete(given, vehicle).numbers
+    Vehicle(**body)
+    if problems := impossible(body):
+        field, message = problems[0]
+        raise SettingError.of(field, shown(body[field]), message)
+    return body

@@ -288,6 +288,7 @@ def twin(team: Team, mean_force: float) -> tuple[Team, float]:
         load_mass=load_mass,
         masses=scale * team.masses,
         inertias=scale * longer**2 * team.inertias,
+        max_thrusts=scale * team.max_thrusts,
         cable_lengths=longer * team.cable_lengths,
     ), scale
 

@@ -14,6 +14,7 @@ limited to what the step can follow.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -238,12 +239,10 @@ class ChainPart(BodiesPart):
         """The team with the ends' share of the cables' mass, parameters of the cables, longest substep."""
         k, n = self.bead_count, team.n
         share = self.line_density * team.cable_lengths / (k + 1)
-        loaded = Team(
+        loaded = replace(
+            team,
             load_mass=team.load_mass + 0.5 * float(share.sum()),
             masses=team.masses + 0.5 * share,
-            inertias=team.inertias,
-            cable_lengths=team.cable_lengths,
-            gravity=team.gravity,
         )
         stiffness = self.stiffness * (k + 1) / team.cable_lengths
         bounce = np.sqrt(
