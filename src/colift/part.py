@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -111,6 +112,8 @@ class Part(BaseModel, metaclass=Refusing):
     """Settings that may be a list with one value per drone."""
     delays_declared: ClassVar[tuple[str, ...]] = ()
     """Settings that are the mission's ``timing.delay``, where it has one and does not give them themselves."""
+    from_team: ClassVar[Mapping[str, float | None]] = {}
+    """Settings that are the team's where they are None (:meth:`left_open`), and what they are where it does not know."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
@@ -132,6 +135,43 @@ class Part(BaseModel, metaclass=Refusing):
             if isinstance(value := getattr(self, name), list)
         }
         return self.model_copy(update=lists) if lists else self
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        """Of the settings in :attr:`from_team` what they are by the team's numbers (n,); not finite where unknown."""
+        return {}
+
+    def settled(self, name: str, team: Team) -> Vector:
+        """A setting of :attr:`from_team` for each drone (n,): as given, else by the team's numbers, else its default."""
+        given = getattr(self, name)
+        if given is None:
+            known, default = self.left_open(team)[name], self.from_team[name]
+            return np.where(np.isfinite(known), known, math.inf if default is None else default)
+        return np.array(np.broadcast_to(np.asarray(given, dtype=float), team.n))
+
+    def filled(self, team: Team) -> Self:
+        """The settings with what is left to the team filled in."""
+        values = {
+            name: self.settled(name, team) for name in self.from_team if getattr(self, name) is None
+        }
+        found = {
+            name: float(value[0]) if np.all(value == value[0]) else value.tolist()
+            for name, value in values.items()
+            if np.isfinite(value).all()
+        }
+        if not found:
+            return self
+        copy = self.model_copy(update=found)
+        copy.model_fields_set.difference_update(found)
+        return copy
+
+    def by_team(self, team: Team) -> list[str]:
+        """Settings that were not given and that the team's numbers say."""
+        known = self.left_open(team)
+        return [
+            name
+            for name in self.from_team
+            if name not in self.model_fields_set and np.isfinite(known[name]).all()
+        ]
 
     def wrong_lengths(self, n: int) -> list[tuple[str, str]]:
         """Lists with one value per drone whose length is not the number of drones, as for :meth:`check`."""
@@ -248,6 +288,11 @@ def driven(part: type[AnyPart]) -> type[AnyPart]:
     part.kernel = kernel(port.signature)(hold_answer if port.answers else hold)
     part.__doc__ = f"Stays what :meth:`colift.flight.flight.Flight.act` set it to: {written}."
     return part
+
+
+def placed(path: str, field: str) -> str:
+    """Path of a field that a part at ``path`` names: its own, or one of the drones by its whole path."""
+    return field if field.startswith("drones.") else f"{path}.{field}"
 
 
 def timing_problems(

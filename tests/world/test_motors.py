@@ -176,7 +176,7 @@ def test_saturation_in_flight_is_counted_and_can_be_a_criterion():
 
 
 def test_default_motors_suit_the_papers_drone():
-    part = Motors()
+    part = Motors().filled(Team.uniform(1))
     assert part.check(Team.uniform(4)) == []
     assert 4.0 * part.max_thrust > 2.0 * 0.5 * 9.81
 

@@ -16,7 +16,7 @@ from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
 from colift.mission.criteria import METRICS
 from colift.mission.schema import Frame, Section, Timing
-from colift.part import KIND, Part, find, kind_of
+from colift.part import KIND, Part, find, kind_of, placed
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
@@ -68,17 +68,19 @@ def cross_checks(
     yield from _event_checks(frame, dict(_with_paths(parts, lists)), broken)
     yield from _criteria_checks(frame)
     if not broken & {"world", "load", "drones", "truth"}:
+        weak = list(_strength_checks(frame)) if must_fly else []
+        yield from weak
         for path, part in _with_paths(parts, lists):
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
             team = frame.true_team if part.layer == "plant" else frame.team
             found = part.check(team)
-            if must_fly and not found:
+            if must_fly and not (found or weak):
                 found = part.conflicts(team)
             for field, message in found:
-                yield Problem(f"{path}.{field}", "", message)
-        if must_fly:
+                yield Problem(placed(path, field), _of_drones(frame, field), message)
+        if must_fly and not weak:
             yield from _start_checks(frame, parts, broken)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
@@ -88,6 +90,22 @@ def cross_checks(
         message = f"must be at most {MAX_DISTURBANCES}"
         yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)
     yield from _fault_checks(frame, parts, lists["fault"], broken)
+
+
+def _of_drones(frame: Frame, field: str) -> str:
+    """Value of a field of the drones, for messages; of other fields their parts tell."""
+    section, _, name = field.rpartition(".")
+    return shown(getattr(frame.drones, name)) if section == "drones" else ""
+
+
+def _strength_checks(frame: Frame) -> Iterable[Problem]:
+    """Drones that cannot lift themselves."""
+    team = frame.team
+    own = team.masses * team.gravity
+    for i in np.flatnonzero(team.max_thrusts <= own):
+        message = f"must exceed {own[i]:.4g} N: drone {i} weighs that"
+        yield Problem("drones.max_thrust", f"{team.max_thrusts[i]:g}", message)
+        break
 
 
 def _fault_checks(
@@ -146,8 +164,9 @@ def hover_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
     hover = allocation.hover(team, directions, frame.timing.allocation)
     for layer, message in hover_conflicts(team, hover, thrusts).items():
         if layer == "actuation":
-            field = actuation.thrust_setting
-            yield Problem(f"actuation.{field}", shown(getattr(actuation, field)), message)
+            path, field = actuation.thrust_path(team), actuation.thrust_setting
+            value = _of_drones(frame, path) or shown(getattr(actuation, field))
+            yield Problem(path, value, message)
         else:
             limits = ", ".join(allocation.binding(team, actuation))
             yield Problem("allocation", "", f"{message}; what limits: {limits}")

@@ -18,6 +18,7 @@ from colift.mission.checks import cross_checks, hover_checks
 from colift.mission.mission import Mission
 from colift.mission.schema import Frame
 from colift.part import KIND, Part, find, names
+from colift.team.vehicles import NUMBERS
 from colift.wording import parse, problems_of, shown
 
 
@@ -54,6 +55,7 @@ def load_mission(
     elif isinstance(source, str | os.PathLike):
         label, table = read_source(source)
         table = _plain(table)
+        _beside(Path(source), table.get("drones"))
     else:
         raise SettingError.of("mission", shown(source), "must be a name, a path or a mapping")
     problems: list[Problem] = []
@@ -125,6 +127,8 @@ def _override(table: dict[str, Any], path: str, value: Any, given: set[str]) -> 
         }
         for setting in node.keys() - own:
             del node[setting]  # the settings of another part mean nothing to this one
+    if parents == ["drones"]:
+        _drop_old_vehicle(table, path, value, given)
     node[leaf] = value
     given.difference_update([known for known in given if known.startswith(f"{path}.")])
     given.add(path)
@@ -149,6 +153,53 @@ def _follow_delay(table: dict[str, Any], before: Any, given: set[str]) -> None:
         for name in part.delays_declared:
             if section.get(name) == before and f"{layer}.{name}" not in given:
                 del section[name]
+
+
+def _beside(source: Path, drones: Any) -> None:
+    """Take files of vehicles that a mission's file names from its own folder."""
+    if not isinstance(drones, dict) or not source.is_file():
+        return
+    vehicle = drones.get("vehicle")
+
+    def found(name: Any) -> Any:
+        is_file = isinstance(name, str) and name.endswith(".toml")
+        return str(source.parent / name) if is_file else name
+
+    if vehicle is not None:
+        drones["vehicle"] = [*map(found, vehicle)] if isinstance(vehicle, list) else found(vehicle)
+
+
+def _drop_old_vehicle(table: dict[str, Any], path: str, value: Any, given: set[str]) -> None:
+    """Take out what an overridden number of the drones makes out of date, but nothing that was given by its own path.
+
+    Another vehicle drops the numbers of the one that stood there before, with the parts' settings that are a vehicle's;
+    another mass, arm or inertia an estimate of the inertia.
+    """
+    drones = table.get("drones")
+    if not isinstance(drones, dict):
+        return
+    field = path.rpartition(".")[2]
+    if field == "vehicle" and drones.get("vehicle") != value:
+        old = [("drones", drones, (*NUMBERS, "inertia_from"))]
+        for layer in FOLDERS:
+            sections = table.get(layer, {})
+            for i, section in enumerate(sections if isinstance(sections, list) else [sections]):
+                if not isinstance(section, dict):
+                    continue
+                kind = section.get("kind", DEFAULT_KINDS.get(layer))
+                if isinstance(kind, str) and kind in names(layer):
+                    where = f"{layer}.{i}" if layer in LISTS else layer
+                    old.append((where, section, tuple(find(layer, kind).from_team)))
+        for where, section, fields in old:
+            for name in fields:
+                if f"{where}.{name}" not in given:
+                    section.pop(name, None)
+    elif field == "inertia":
+        drones.pop("inertia_from", None)
+    elif field in ("mass", "arm") and drones.get("inertia_from") == "estimate":
+        if "drones.inertia" not in given:
+            drones.pop("inertia", None)
+        drones.pop("inertia_from", None)
 
 
 def _plain(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -194,8 +245,11 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
         problems.extend(hover_checks(frame, parts))
     if problems:
         return None
+    team = frame.team
+    filled = {name: part.filled(team) for name, part in parts.items()}
+    filled_lists = {name: [part.filled(team) for part in each] for name, each in lists.items()}
     return Mission.model_validate(
-        {**dict(frame), **parts, **lists, "kinds": kinds, "list_kinds": list_kinds}
+        {**dict(frame), **filled, **filled_lists, "kinds": kinds, "list_kinds": list_kinds}
     )
 
 

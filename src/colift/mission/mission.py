@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from pydantic import Field, SerializeAsAny
 
 from colift.control.agents.base import AgentPart
@@ -16,7 +17,8 @@ from colift.control.position_control.base import PositionControlPart
 from colift.control.reference.base import ReferencePart
 from colift.control.supervision.base import SupervisionPart
 from colift.mission.schema import Described
-from colift.part import LISTS
+from colift.part import LISTS, Part
+from colift.team import Team
 from colift.world.actuation.base import ActuationPart
 from colift.world.disturbance.base import DisturbancePart
 from colift.world.fault.base import FaultPart
@@ -57,13 +59,28 @@ class Mission(Described):
     """Faults to come."""
 
     def resolved(self) -> dict[str, Any]:
-        """The whole mission with every default filled in, as plain data (a valid mission file)."""
+        """The whole mission with every default filled in, as plain data (a valid mission file).
+
+        What the drones' numbers say stands with the drones, not again in the parts that take it from there.
+        """
         data = self.model_dump(mode="json", exclude={"kinds", "list_kinds"}, exclude_none=True)
+        team = self.team
         for layer, kind in self.kinds.items():
-            data[layer] = {"kind": kind, **data[layer]}
+            data[layer] = _described(kind, data[layer], getattr(self, layer), team)
         for name in LISTS:
             data[name] = [
-                {"kind": kind, **settings}
-                for kind, settings in zip(self.list_kinds[name], data[name], strict=True)
+                _described(kind, settings, part, team)
+                for kind, settings, part in zip(
+                    self.list_kinds[name], data[name], getattr(self, name), strict=True
+                )
             ]
+        if any(name.endswith(".toml") for name in np.atleast_1d(self.drones.vehicle or "")):
+            del data["drones"]["vehicle"]  # the numbers stand there; the file may be gone by then
         return data
+
+
+def _described(kind: str, settings: dict[str, Any], part: Part, team: Team) -> dict[str, Any]:
+    """A part as its section: its kind, and its settings without those that the team's numbers say."""
+    said = part.by_team(team)
+    kept = {name: value for name, value in settings.items() if name not in said}
+    return {"kind": kind, **kept}

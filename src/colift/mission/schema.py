@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from colift.catalogue import LAYERS
-from colift.team import Team
+from colift.errors import ColiftError
+from colift.team import Team, vehicles
 from colift.team.geometry import Array, ring
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -36,6 +45,28 @@ _ForEach = Annotated[list[Positive], Tag("each")]
 PerDrone = Annotated[Annotated[Positive, Tag("all")] | _ForEach, _per_drone(0)]
 InertiaForEach = Annotated[list[Inertia], Tag("each")]
 InertiaPerDrone = Annotated[Annotated[Inertia, Tag("all")] | InertiaForEach, _per_drone(1)]
+
+
+_NameForEach = Annotated[list[str], Tag("each")]
+NamePerDrone = Annotated[Annotated[str, Tag("all")] | _NameForEach, _per_drone(0)]
+_ThrustForEach = Annotated[list[vehicles.Thrust], Tag("each")]
+ThrustPerDrone = Annotated[Annotated[vehicles.Thrust, Tag("all")] | _ThrustForEach, _per_drone(0)]
+_LagForEach = Annotated[list[vehicles.Lag], Tag("each")]
+LagPerDrone = Annotated[Annotated[vehicles.Lag, Tag("all")] | _LagForEach, _per_drone(0)]
+_SizeForEach = Annotated[list[vehicles.Size], Tag("each")]
+SizePerDrone = Annotated[Annotated[vehicles.Size, Tag("all")] | _SizeForEach, _per_drone(0)]
+_RadiusForEach = Annotated[list[vehicles.Radius], Tag("each")]
+RadiusPerDrone = Annotated[Annotated[vehicles.Radius, Tag("all")] | _RadiusForEach, _per_drone(0)]
+_RotorsForEach = Annotated[list[vehicles.Rotors], Tag("each")]
+RotorsPerDrone = Annotated[Annotated[vehicles.Rotors, Tag("all")] | _RotorsForEach, _per_drone(0)]
+_RatioForEach = Annotated[list[vehicles.TorqueRatio], Tag("each")]
+TorqueRatioPerDrone = Annotated[
+    Annotated[vehicles.TorqueRatio, Tag("all")] | _RatioForEach, _per_drone(0)
+]
+_ShareForEach = Annotated[list[vehicles.Share], Tag("each")]
+SharePerDrone = Annotated[Annotated[vehicles.Share, Tag("all")] | _ShareForEach, _per_drone(0)]
+_DragForEach = Annotated[list[vehicles.RotorDrag], Tag("each")]
+DragPerDrone = Annotated[Annotated[vehicles.RotorDrag, Tag("all")] | _DragForEach, _per_drone(0)]
 
 
 Factor = Annotated[float, Field(gt=0.01, le=100.0)]
@@ -78,26 +109,133 @@ class Load(Section):
 
 
 class Drones(Section):
-    """The drones and their cables; one value for all, or a list with one value per drone."""
+    """The drones and their cables; one value for all, or a list with one value per drone.
 
+    A number that is left out is the vehicle's. Without a vehicle, mass and inertia are the paper's, and what else is
+    left out is not known: what depends on it has a default of its own.
+    """
+
+    vehicle: NamePerDrone | None = None
+    """A drone by its name, or the path of a TOML file with its numbers."""
     count: Annotated[int, Field(ge=1, le=MAX_DRONES)] = 4
     """Number of drones."""
-    mass: PerDrone = 0.5
-    """kg."""
-    inertia: InertiaPerDrone = (0.021, 0.0187, 0.0397)
-    """Principal moments of inertia, body frame, kg m^2."""
+    mass: PerDrone = vehicles.PAPER_MASS
+    """With battery, kg."""
+    inertia: InertiaPerDrone = vehicles.PAPER_INERTIA
+    """Principal moments of inertia, body frame, kg m^2; left out, they are estimated where ``arm`` is known."""
     cable_length: PerDrone = 1.0
     """m."""
+    max_thrust: ThrustPerDrone | None = None
+    """Largest steady thrust of a drone, all its rotors together, N."""
+    motor_lag: LagPerDrone | None = None
+    """Time constant of a motor's thrust, s."""
+    arm: SizePerDrone | None = None
+    """From a drone's centre to a rotor's axis, m."""
+    radius: RadiusPerDrone | None = None
+    """From the centre to the outermost tip of a rotor, m; left out: ``arm`` and ``rotor_radius`` together."""
+    rotor_radius: SizePerDrone | None = None
+    """Of one rotor, m."""
+    rotors: RotorsPerDrone | None = None
+    """Number of rotors: 4, 6 or 8."""
+    torque_ratio: TorqueRatioPerDrone | None = None
+    """Torque about a motor's axis per thrust, m."""
+    rotor_drag: DragPerDrone | None = None
+    """Force in the rotors' plane per thrust and speed across it, s/m."""
+    energy: PerDrone | None = None
+    """Of a full battery, J."""
+    efficiency: SharePerDrone | None = None
+    """Ideal power of the rotors in hover over the battery's power."""
+    inertia_from: Literal["given", "vehicle", "estimate", "paper"] | None = None
+    """Where the inertia comes from; written by colift, for whoever reads the resolved mission."""
+
+    @field_validator("vehicle")
+    @classmethod
+    def _known(cls, value: str | list[str] | None) -> str | list[str] | None:
+        for name in [value] if isinstance(value, str) else value or []:
+            try:
+                vehicles.Vehicle.named(name)
+            except ColiftError as error:
+                raise ValueError(str(error)) from error
+        return value
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Fill in what is left out: the vehicle's numbers, and what follows from them."""
+        told = self.model_fields_set & {*vehicles.NUMBERS}
+        if not told and self.vehicle is None:
+            return self
+        if self.wrong_lengths(self.count):
+            return self
+        names = self.vehicle if isinstance(self.vehicle, list) else [self.vehicle] * self.count
+        kinds = {name: None if name is None else vehicles.Vehicle.named(name) for name in {*names}}
+        given = self._numbers(told)
+        bodies = [vehicles.complete(given[i], kinds[name]) for i, name in enumerate(names)]
+        for name in {*vehicles.NUMBERS} - told:
+            values = [body.numbers.get(name) for body in bodies]
+            if None not in values:
+                same = all(value == values[0] for value in values)
+                self.__dict__[name] = values[0] if same else values
+        if self.inertia_from is None:
+            sources = [body.inertia_from for body in bodies]
+            worst = next(s for s in ("estimate", "paper", "vehicle", "given") if s in sources)
+            self.__dict__["inertia_from"] = None if worst == "given" else worst
+        return self
+
+    def numbers(self) -> list[dict[str, Any]]:
+        """What is known of each drone, by field."""
+        return self._numbers(vehicles.NUMBERS)
+
+    def _numbers(self, fields: Iterable[str]) -> list[dict[str, Any]]:
+        values = {field: getattr(self, field) for field in fields}
+        return [
+            {
+                field: value[drone] if isinstance(value, list) else value
+                for field, value in values.items()
+                if value is not None
+            }
+            for drone in range(self.count)
+        ]
 
     def problems(self) -> list[tuple[str, str, str]]:
-        """Lists whose length is not the number of drones, and moments that no body has."""
+        """Lists whose length is not the number of drones, and numbers that no drone has together."""
         found = self.wrong_lengths(self.count)
-        for row in self.inertia if isinstance(self.inertia, list) else [self.inertia]:
-            if max(row) > sum(row) - max(row) + 1e-9 * sum(row):
-                message = "no body has these: each moment must be at most the sum of the other two"
-                found.append(("inertia", str(list(row)), message))
+        wrong = {field for field, _, _ in found}
+        if wrong & {*vehicles.NUMBERS}:
+            rows = self.inertia if isinstance(self.inertia, list) else [self.inertia]
+            bodies = [{"inertia": row} for row in rows]
+        else:
+            bodies = self.numbers()
+        for number, body in enumerate(bodies):
+            for field, message in vehicles.impossible(body):
+                value = body[field]
+                text = str(list(value)) if field == "inertia" else f"{value:g}"
+                several = isinstance(getattr(self, field), list) and field != "inertia"
+                found.append((f"{field}.{number}" if several else field, text, message))
+            if len(found) > len(wrong):
                 break
         return found
+
+    def notes(self) -> list[tuple[str, str]]:
+        """What was put in for what is left out and should be known better, as ``(field, message)``."""
+        if self.inertia_from == "estimate":
+            for drone, body in enumerate(self.numbers()):
+                J = vehicles.estimated_inertia(body["mass"], body.get("arm", 0.0))
+                if tuple(body["inertia"]) == J:
+                    text = ", ".join(f"{moment:.3g}" for moment in J)
+                    message = (
+                        f"is estimated from mass and arm, as m a^2 (1/4, 1/4, 1/2): {text} kg m^2 for drone {drone}, "
+                        "good to a factor of two; measure it, or take it from a model"
+                    )
+                    return [("inertia", message)]
+        if self.inertia_from == "paper" and "mass" in self.model_fields_set:
+            return [
+                (
+                    "inertia",
+                    f"is that of the paper's drone of {vehicles.PAPER_MASS:g} kg, but a mass is given: give the inertia "
+                    "too, or arm, from which it is estimated",
+                )
+            ]
+        return []
 
 
 class Truth(Section):
@@ -262,11 +400,9 @@ class Frame(Section):
     def team(self) -> Team:
         """The drones, cables and load as arrays."""
         n, drones = self.drones.count, self.drones
-        inertia = np.array(drones.inertia, dtype=float)
-        return Team(
+        return Team.of_bodies(
+            drones.numbers(),
             load_mass=self.load.mass,
-            masses=np.array(np.broadcast_to(drones.mass, n), dtype=float),
-            inertias=np.array(np.broadcast_to(inertia, (n, 3))),
             cable_lengths=np.array(np.broadcast_to(drones.cable_length, n), dtype=float),
             gravity=self.world.gravity,
         )

@@ -8,10 +8,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from colift.errors import Problem
-from colift.part import FOLDERS, LISTS
+from colift.part import FOLDERS, LISTS, placed
 
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
+
+
+def notes_of(mission: Mission) -> list[Problem]:
+    """What was put in for numbers that the mission leaves out and that should be known better."""
+    return [Problem(f"drones.{field}", "", message) for field, message in mission.drones.notes()]
 
 
 def warnings_of(mission: Mission) -> list[Problem]:
@@ -26,7 +31,9 @@ def warnings_of(mission: Mission) -> list[Problem]:
         )
         for path, part in named:
             for field, message in part.warnings(mission):
-                value = getattr(part, field, "")
+                where = placed(path, field)
+                owner = mission.drones if where == field else part
+                value = getattr(owner, field.rpartition(".")[2], "")
                 shown = f"{value:g}" if isinstance(value, float) else str(value)
-                found.append(Problem(f"{path}.{field}", shown, message))
+                found.append(Problem(where, shown, message))
     return found

@@ -200,10 +200,12 @@ def peak_thrust_fraction(r: Recording) -> float:
 
 
 def thrust_limits(recording: Recording) -> NDArray[np.float64] | None:
-    """The most that each drone can give (n,), N: by its motors, or else by its allocator's limit; None if unlimited."""
+    """The most that each drone can give (n,), N: by its motors, its vehicle, or its allocator's limit; None if unlimited."""
     settings = recording.mission.resolved()
     motor = settings.get("actuation", {}).get("max_thrust")
-    drone = settings.get("allocation", {}).get("max_thrust")
+    drone = settings.get("drones", {}).get("max_thrust")
+    if drone is None:
+        drone = settings.get("allocation", {}).get("max_thrust")
     most = drone if motor is None else 4.0 * np.asarray(motor, dtype=float)
     return None if most is None else np.broadcast_to(np.asarray(most, dtype=float), recording.n)
 

@@ -210,12 +210,13 @@ def answers(
 
 def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0) -> Attack:
     """Send one seeded family of forces through one allocator and judge every answer."""
-    limits = problem(n)[1]
+    team, limits = problem(n)[0], problem(n)[1]
+    lowest, highest = limits.tension_floors(team), limits.tension_caps(team)
     smallest, broken, unflagged, yields, avoidable, bad = 180.0, 0.0, 0, 0, 0, 0
     times = []
     reach = (
-        limits.tension_floors(n),
-        limits.tension_caps(n),
+        lowest,
+        highest,
         limits.max_rate * PERIOD,
         math.radians(limits.max_cone_deg),
     )
@@ -227,8 +228,8 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
         chord = np.linalg.norm(alpha - previous, axis=2)
         turned = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
         over = (
-            np.max(T) - float(np.max(limits.tension_max)),
-            float(np.min(limits.tension_min)) - np.min(T),
+            np.max(T) - float(np.max(highest)),
+            float(np.min(lowest)) - np.min(T),
             np.max(np.arccos(np.clip(-alpha[..., 2], -1, 1))) - math.radians(limits.max_cone_deg),
             np.max(turned) - limits.max_rate * PERIOD,
         )

@@ -150,9 +150,9 @@ def motors(mission: Mission) -> Overrides:
     """
     if type(mission.actuation).has_motors:
         return {}
-    real = Motors()
+    real = Motors().filled(mission.team)
     told = {
-        f"{layer}.lag": real.time_constant
+        f"{layer}.lag": real.motor_lag()
         for layer in LAYERS
         if getattr(getattr(mission, layer), "lag", None) == 0.0
     }

@@ -75,6 +75,10 @@ class Motors(Protocol):
         """Largest steady thrust of each drone (n,), N; inf where there is no limit."""
         ...
 
+    def thrust_path(self, team: Team) -> str:
+        """Path in the mission of what limits the thrust, for messages."""
+        ...
+
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
         """Why they cannot fly this team."""
         ...

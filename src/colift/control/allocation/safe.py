@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, TypedDict, Unpack
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -191,6 +192,12 @@ RATE_BARRIER = 1.0
 """Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
 GIVE_WAY = 20.0
 """Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
+LOW = 0.1
+"""Least tension over a cable's share of the load's weight, where the drones' thrust is known and no limit is given."""
+MOST = 0.9
+"""Share of a drone's thrust that is planned with then: with the rest it turns and resists the wind."""
+HIGH = 0.85
+"""Share of it that holds the drone and its cable at the largest tension."""
 RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
 
@@ -207,6 +214,11 @@ class Safe(AllocatorPart):
     kernel = _allocate
     spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
     per_drone = ("tension_min", "tension_max", "max_thrust", "weights")
+    from_team: ClassVar[Mapping[str, float | None]] = {
+        "tension_min": 0.05,
+        "tension_max": 5.0,
+        "max_thrust": None,
+    }
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
     """Weight of the alignment penalty, N^2."""
@@ -217,16 +229,18 @@ class Safe(AllocatorPart):
     """Force for which ``mu`` is meant when it is scaled, N (default: weight of the paper's load)."""
     min_angle_deg: Annotated[float, Field(gt=0.0, lt=150.0)] = 30.0
     """Least angle between any two cables, degrees."""
-    tension_min: Force | list[Force] = 0.05
-    """Least tension, N; one value, or one per cable."""
-    tension_max: Force | list[Force] = 5.0
-    """Largest tension, N; one value, or one per cable."""
+    tension_min: Force | list[Force] | None = None
+    """Least tension, N; one value, or one per cable. None: a tenth of a cable's share of the load's weight where
+    ``drones.max_thrust`` is known, else 0.05."""
+    tension_max: Force | list[Force] | None = None
+    """Largest tension, N; one value, or one per cable. None: what 0.85 of ``drones.max_thrust`` lifts beside the drone,
+    or 5."""
     max_cone_deg: Degrees = 75.0
     """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
     max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 6.0
     """Fastest turn of a cable's direction, rad/s."""
     max_thrust: Force | list[Force] | None = None
-    """Largest thrust of a drone, N; none: not limited."""
+    """Largest thrust of a drone, N. None: 0.9 of ``drones.max_thrust``, or not limited."""
     max_tilt_deg: Degrees | None = None
     """Largest angle between a drone's thrust and the vertical, degrees; none: not limited."""
     weights: Annotated[float, Field(gt=0.0)] | list[Annotated[float, Field(gt=0.0)]] = 1.0
@@ -246,6 +260,8 @@ class Safe(AllocatorPart):
 
     @model_validator(mode="after")
     def _ranges(self) -> Safe:
+        if self.tension_min is None or self.tension_max is None:
+            return self
         low = np.atleast_1d(np.asarray(self.tension_min, dtype=float))
         high = np.atleast_1d(np.asarray(self.tension_max, dtype=float))
         comparable = 1 in (low.size, high.size) or low.size == high.size
@@ -257,22 +273,46 @@ class Safe(AllocatorPart):
         return self
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        return self.wrong_lengths(team.n)
+        return self.wrong_lengths(team.n) or self._crossed(team)
+
+    def _crossed(self, team: Team) -> list[tuple[str, str]]:
+        """A given limit of the tension beyond the other, which is left to the team."""
+        low, high = self.settled("tension_min", team), self.settled("tension_max", team)
+        if (self.tension_min is None) == (self.tension_max is None) or np.all(1.2 * low <= high):
+            return []
+        i = int(np.argmax(1.2 * low - high))
+        message = (
+            f"tension_min = {low[i]:.4g} conflicts with tension_max = {high[i]:.4g}: "
+            "each cable needs tension_max of at least 1.2 tension_min"
+        )
+        return [("tension_min" if self.tension_max is None else "tension_max", message)]
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        known = np.isfinite(team.max_thrusts)
+        share = team.load_mass * max(team.gravity, 1e-3) / team.n
+        lifts = HIGH * team.max_thrusts - team.masses * team.gravity
+        return {
+            "tension_min": np.where(known, LOW * share, math.nan),
+            "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), math.nan),
+            "max_thrust": MOST * team.max_thrusts,
+        }
 
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
         problems = []
-        if self.max_thrust is not None:
-            own = team.masses * team.gravity
-            weak = np.flatnonzero(0.8 * np.broadcast_to(self.max_thrust, team.n) < own)
-            if weak.size:
-                i = int(weak[0])
-                problems.append(
-                    (
-                        "max_thrust",
-                        f"max_thrust = {self.max_thrust} conflicts with drones.mass: drone {i} alone "
-                        f"weighs {own[i]:.4g} N and needs a quarter more to fly",
-                    )
-                )
+        most = self.thrust_limits(team)
+        own = team.masses * team.gravity
+        weak = np.flatnonzero(0.8 * most < own)
+        if weak.size:
+            i = int(weak[0])
+            need = f"drone {i} alone weighs {own[i]:.4g} N and needs a quarter more to fly"
+            told = (
+                "max_thrust",
+                f"max_thrust = {self.max_thrust} conflicts with drones.mass: {need}",
+            )
+            if "max_thrust" in self.by_team(team):
+                least = f"must be at least {own[i] / (0.8 * MOST):.4g} N"
+                told = ("drones.max_thrust", f"{least}: {need}, with {MOST:g} of it planned with")
+            problems.append(told)
         return problems + feasible.conflicts_of(team, self)
 
     def cannot_hold(self, team: Team, thrusts: Vector, directions: Vector) -> list[str]:
@@ -283,8 +323,7 @@ class Safe(AllocatorPart):
 
     def thrust_limits(self, team: Team) -> Vector:
         """Largest thrust of each drone (n,) as far as the allocator is told, N; inf: not limited."""
-        most = math.inf if self.max_thrust is None else self.max_thrust
-        return np.array(np.broadcast_to(np.asarray(most, dtype=float), team.n))
+        return self.settled("max_thrust", team)
 
     def cannot_start(self, team: Team, directions: Array) -> str:
         if self._keeps_limits(directions):
@@ -317,17 +356,18 @@ class Safe(AllocatorPart):
         pairs = pairwise_angles(directions)
         return bool(np.all(pairs > least) and np.all(-directions[:, 2] > math.cos(cone)))
 
-    def tension_caps(self, n: int) -> Vector:
+    def tension_caps(self, team: Team) -> Vector:
         """Largest tension of each cable (n,), N."""
-        return np.array(np.broadcast_to(np.asarray(self.tension_max, dtype=float), n))
+        return self.settled("tension_max", team)
 
-    def tension_floors(self, n: int) -> Vector:
+    def tension_floors(self, team: Team) -> Vector:
         """Least tension of each cable (n,), N."""
-        return np.array(np.broadcast_to(np.asarray(self.tension_min, dtype=float), n))
+        return self.settled("tension_min", team)
 
     def params(self, team: Team) -> Vector:
         n = team.n
-        limited = self.max_thrust is not None or self.max_tilt_deg is not None
+        most = self.thrust_limits(team)
+        limited = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
         weights = self._relative_weights(n)
         least, reach = math.radians(self.min_angle_deg), self._reach(n)
         cone, tilt = math.radians(self.max_cone_deg), math.radians(self.max_tilt_deg or 89.0)
@@ -357,13 +397,13 @@ class Safe(AllocatorPart):
             cos_cone=math.cos(cone),
             cos_tilt=math.cos(tilt),
             tan_lean=math.tan(cycle.LEVEL * tilt),
-            total=float(np.sum(self.tension_caps(n))),
+            total=float(np.sum(self.tension_caps(team))),
             equal=bool(np.all(weights == 1.0)),
             weight=weights,
-            T_min=self.tension_floors(n),
-            T_max=self.tension_caps(n),
+            T_min=self.tension_floors(team),
+            T_max=self.tension_caps(team),
             m=team.masses,
-            f_max=1e6 if self.max_thrust is None else self.max_thrust,
+            f_max=np.minimum(most, 1e6),
         )
 
     def _relative_weights(self, n: int) -> Vector:
@@ -412,8 +452,8 @@ class SafeSettings(_Further, total=False):
 
     mu: float
     min_angle_deg: float
-    tension_min: float | list[float]
-    tension_max: float | list[float]
+    tension_min: float | list[float] | None
+    tension_max: float | list[float] | None
     max_cone_deg: float
 
 
@@ -440,8 +480,8 @@ class SafeAllocator(Allocator):
         n: int | Team = 4,
         mu: float = 0.15,
         min_angle_deg: float = 30.0,
-        tension_min: float | list[float] = 0.05,
-        tension_max: float | list[float] = 5.0,
+        tension_min: float | list[float] | None = None,
+        tension_max: float | list[float] | None = None,
         max_cone_deg: float = 75.0,
         *,
         cone_deg: float = 35.0,

@@ -27,13 +27,23 @@ class ActuationPart(Part):
     thrust_setting: ClassVar[str] = "kind"
     """Setting that limits the thrust, for messages."""
 
+    def thrust_path(self, team: Team) -> str:
+        """Path in the mission of what limits the thrust, for messages: the drones' number or the setting."""
+        known = np.isfinite(team.max_thrusts).all()
+        if known and np.array_equal(self.thrust_limits(team), team.max_thrusts):
+            return "drones.max_thrust"
+        return f"{self.layer}.{self.thrust_setting}"
+
     def motor_lag(self) -> float:
         """Time constant of the motors, s."""
         return 0.0
 
     def thrust_limits(self, team: Team) -> Vector:
-        """Largest steady thrust of each drone (n,), N; inf where there is no limit."""
-        return np.full(team.n, np.inf)
+        """Largest steady thrust of each drone (n,), N; inf where there is no limit.
+
+        Where nothing is simulated that limits it, it is what the drones are known to have.
+        """
+        return team.max_thrusts.copy()
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         drones = mission.first_drones()
@@ -49,7 +59,7 @@ class ActuationPart(Part):
         if needed[i] > (1.0 - SPARE) * given[i]:
             spare = 100.0 * (1.0 - needed[i] / given[i])
             yield (
-                self.thrust_setting,
+                self.thrust_path(team).removeprefix(f"{self.layer}."),
                 f"leaves {spare:.2g} % of thrust to spare: to hold load.mass = {team.load_mass:g} kg in hover "
                 f"drone {i} needs {needed[i]:.4g} N of its {given[i]:.4g} N, and turning and wind take more",
             )

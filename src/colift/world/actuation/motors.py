@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -18,6 +19,16 @@ from colift.world.actuation.base import SIGNATURE, ActuationPart
 
 Thrust = Annotated[float, Field(gt=0.0, le=1e4)]
 Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
+Length = Annotated[float, Field(gt=0.0, le=5.0)]
+Ratio = Annotated[float, Field(gt=0.0, le=1.0)]
+Lag = Annotated[float, Field(ge=0.0, le=1.0)]
+Rate = Annotated[float, Field(gt=0.0, le=1e6)]
+Noise = Annotated[float, Field(ge=0.0, le=100.0)]
+
+RISE = 0.03
+"""Time in which a motor whose largest thrust is known gets there from none, s."""
+NOISE = 1.0 / 300.0
+"""Standard deviation of such a motor's thrust over its largest."""
 
 # Motors stand at (x, y) = arm / sqrt(2) times these, and turn their drone about z by the third.
 _X = (1.0, -1.0, -1.0, 1.0)
@@ -28,9 +39,9 @@ _ROUNDING = 1e-9  # N, by which a thrust may miss its limits before the mixer gi
 
 PARAMS = Layout(
     team={
-        "lever": 1, "ratio": 1, "lag": 1, "rate": 1, "keep": 1, "kick": 1, "offset": 2, "least": 1,
+        "offset": 2, "least": 1,
     },
-    drone={"most": 1},
+    drone={"lever": 1, "ratio": 1, "lag": 1, "rate": 1, "keep": 1, "kick": 1, "most": 1},
 )  # fmt: skip
 """``keep`` and ``kick``: share of the noise that stays over a tick, and what is added; thrusts ``least`` and ``most``."""
 MEMORY = Layout(drone={"next": 1, "thrust": 4, "noise": 4, "wanted": 4})
@@ -79,15 +90,15 @@ def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     applied_thrusts, applied_torques = writes.applied_thrusts, writes.applied_torques
     saturated_times = writes.saturated_times
     n = thrusts.shape[0]
-    lever, ratio, lag, rate = params[P.lever], params[P.ratio], params[P.lag], params[P.rate]
-    keep = decay(dt, lag)
     now = noise.tick(step, dt)
     for i in range(n):
-        o = M.rows + M.width * i
+        o, p = M.rows + M.width * i, P.rows + P.width * i
+        lever, ratio, rate = params[p + P.lever], params[p + P.ratio], params[p + P.rate]
+        keep = decay(dt, params[p + P.lag])
         wanted = memory[o + M.wanted : o + M.wanted + 4]
         fits = mix(
             thrusts[i], torques[i, 0], torques[i, 1], torques[i, 2], lever, ratio, params[P.least],
-            params[P.rows + P.width * i + P.most], wanted,
+            params[p + P.most], wanted,
         )  # fmt: skip
         if not fits:
             saturated_times[i] += dt
@@ -97,7 +108,7 @@ def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 kick = noise.normals(key, number, 2 * i + pair)
                 for j in range(2):
                     N = o + M.noise + 2 * pair + j
-                    memory[N] = params[P.keep] * memory[N] + params[P.kick] * kick[j]
+                    memory[N] = params[p + P.keep] * memory[N] + params[p + P.kick] * kick[j]
         memory[o + M.next] = now + 1
         f = tau_x = tau_y = tau_z = 0.0
         for j in range(4):
@@ -126,63 +137,97 @@ class Motors(ActuationPart):
     not allow all, yaw gives way first; near full thrust, thrust gives way to roll and pitch, for a drone that
     cannot turn cannot aim; near none, they give way to it. A weak motor gives its share; the mixer is not told.
 
-    Defaults are chosen for the paper's drone of 0.5 kg: 2.4 times its weight, a lag between those of RotorS'
-    Hummingbird (12.5 ms up, 25 ms down) and a torque ratio near that model's 0.016 m.
+    What is left out is the vehicle's (``drones``); what that does not tell either is chosen for the paper's drone of
+    0.5 kg: 2.4 times its weight, a lag between those of RotorS' Hummingbird (12.5 ms up, 25 ms down) and a torque
+    ratio near that model's 0.016 m. With six or eight rotors, each motor here stands for a quarter of them, on an arm
+    that turns the drone as much as they can about their weaker axis: with N rotors at distance a, of which the
+    outermost may change by d, these are 4 (d N / 4) a / 2.
     """
 
     kernel = _turn
     remembers = MEMORY
-    per_drone = ("max_thrust",)
+    per_drone = (
+        "arm_length", "torque_ratio", "max_thrust", "time_constant", "max_rate", "noise",
+    )  # fmt: skip
+    from_team: ClassVar[Mapping[str, float | None]] = {
+        "arm_length": 0.2, "torque_ratio": 0.016, "max_thrust": 3.0, "time_constant": 0.02, "max_rate": 100.0,
+        "noise": 0.01,
+    }  # fmt: skip
     thrust_setting: ClassVar[str] = "max_thrust"
 
-    arm_length: Annotated[float, Field(gt=0.0, le=5.0)] = 0.2
-    """From the centre to a rotor, m."""
-    torque_ratio: Annotated[float, Field(gt=0.0, le=1.0)] = 0.016
-    """Torque about a motor's axis per thrust, m."""
-    max_thrust: Thrust | list[Thrust] = 3.0
-    """Largest thrust of one motor, N; one value, or one for each drone."""
+    arm_length: Length | list[Length] | None = None
+    """From the centre to a rotor, m; one value, or one for each drone, as of all that follow but ``min_thrust`` and
+    ``centre_offset``. None: ``drones.arm``, or 0.2."""
+    torque_ratio: Ratio | list[Ratio] | None = None
+    """Torque about a motor's axis per thrust, m. None: ``drones.torque_ratio``, or 0.016."""
+    max_thrust: Thrust | list[Thrust] | None = None
+    """Largest thrust of one motor, N. None: a quarter of ``drones.max_thrust``, or 3."""
     min_thrust: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
     """Least thrust of one motor, N: motors that must not stop."""
-    time_constant: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
-    """Of the lag of a motor's thrust, s."""
-    max_rate: Annotated[float, Field(gt=0.0, le=1e6)] = 100.0
-    """Fastest change of a motor's thrust, N/s."""
-    noise: Annotated[float, Field(ge=0.0, le=100.0)] = 0.01
-    """Standard deviation of a motor's thrust, N; it has the motor's bandwidth."""
+    time_constant: Lag | list[Lag] | None = None
+    """Of the lag of a motor's thrust, s. None: ``drones.motor_lag``, or 0.02."""
+    max_rate: Rate | list[Rate] | None = None
+    """Fastest change of a motor's thrust, N/s. None: what reaches the largest thrust that ``drones`` tells from none in
+    30 ms, or 100."""
+    noise: Noise | list[Noise] | None = None
+    """Standard deviation of a motor's thrust, N; it has the motor's bandwidth. None: a 300th of the largest thrust
+    that ``drones`` tells, or 0.01."""
     centre_offset: tuple[Offset, Offset] = (0.0, 0.0)
     """Centre of gravity from the centre of the rotors, body x and y, m; the mixer is not told."""
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         if problems := self.wrong_lengths(team.n):
             return problems
-        if self.min_thrust >= np.min(self.max_thrust):
-            return [("min_thrust", f"must be below max_thrust = {np.min(self.max_thrust):g} N")]
+        most = float(np.min(self.settled("max_thrust", team)))
+        if self.min_thrust >= most:
+            return [("min_thrust", f"must be below max_thrust = {most:g} N")]
         return []
 
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        most = 0.25 * team.max_thrusts
+        return {
+            "arm_length": team.arms, "torque_ratio": team.torque_ratios, "max_thrust": most,
+            "time_constant": team.motor_lags, "max_rate": most / RISE, "noise": NOISE * most,
+        }  # fmt: skip
+
     def motor_lag(self) -> float:
-        return self.time_constant
+        if self.time_constant is None:
+            return float(self.from_team["time_constant"] or 0.0)
+        return float(np.max(self.time_constant))
 
     def thrust_limits(self, team: Team) -> Vector:
-        return np.array(np.broadcast_to(4.0 * np.asarray(self.max_thrust, dtype=float), team.n))
+        return 4.0 * self.settled("max_thrust", team)
 
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
         spare = self.thrust_limits(team) - team.masses * team.gravity
         if np.min(spare) <= 0.0:
             i = int(np.argmin(spare))
             own = team.masses[i] * team.gravity
-            return [("max_thrust", f"must exceed {0.25 * own:.4g} N: drone {i} weighs {own:.4g} N")]
+            if self.thrust_path(team) == "drones.max_thrust":
+                message = f"must exceed {own:.4g} N: drone {i} weighs that"
+            else:
+                message = f"must exceed {0.25 * own:.4g} N: drone {i} weighs {own:.4g} N"
+            return [(self._thrust_field(team), message)]
         if np.sum(spare) <= team.load_mass * team.gravity:
             most = np.sum(spare) / team.gravity
             message = f"{team.n} drones lift less than {most:.4g} kg beside their own weight"
-            return [("max_thrust", f"{message}; load.mass is {team.load_mass:.4g} kg")]
+            message = f"{message}; load.mass is {team.load_mass:.4g} kg"
+            return [(self._thrust_field(team), message)]
         return []
 
+    def _thrust_field(self, team: Team) -> str:
+        return self.thrust_path(team).removeprefix(f"{self.layer}.")
+
     def params(self, team: Team) -> Vector:
-        lever = self.arm_length / math.sqrt(2.0)
-        keep = math.exp(-noise.TICK / self.time_constant) if self.time_constant > 0.0 else 0.0
-        kick = self.noise * math.sqrt(1.0 - keep * keep)
+        lag, noises = self.settled("time_constant", team), self.settled("noise", team)
+        keep = [math.exp(-noise.TICK / each) if each > 0.0 else 0.0 for each in lag.tolist()]
+        kick = [
+            each * math.sqrt(1.0 - k * k) for each, k in zip(noises.tolist(), keep, strict=True)
+        ]
+        arms = self.settled("arm_length", team)
+        lever = np.where(team.rotors > 4.0, 0.5 * arms, arms / math.sqrt(2.0))
         return PARAMS.pack(
-            team.n, lever=lever, ratio=self.torque_ratio, lag=self.time_constant,
-            rate=self.max_rate, keep=keep, kick=kick, offset=self.centre_offset,
-            least=self.min_thrust, most=self.max_thrust,
+            team.n, lever=lever, ratio=self.settled("torque_ratio", team), lag=lag,
+            rate=self.settled("max_rate", team), keep=keep, kick=kick, offset=self.centre_offset,
+            least=self.min_thrust, most=self.settled("max_thrust", team),
         )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 from pydantic import Field
@@ -16,6 +17,7 @@ from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Area = Annotated[float, Field(ge=0.0, le=10.0)]
 Linear = Annotated[float, Field(ge=0.0, le=10.0)]
+RotorDrag = Annotated[float, Field(ge=0.0, le=1.0)]
 
 # Gauss and Legendre's three points on (0, 1): exact for polynomials up to degree five.
 _POINTS = (0.5 - 0.5 * math.sqrt(0.6), 0.5, 0.5 + 0.5 * math.sqrt(0.6))
@@ -24,8 +26,9 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 PARAMS = Layout(
     team={
         "density": 1, "drone_area": 1, "drone_linear": 1, "load_area": 1, "load_linear": 1,
-        "rotor_drag": 1, "cable": 1,
-    }
+        "cable": 1,
+    },
+    drone={"rotor_drag": 1},
 )  # fmt: skip
 """``cable``: drag coefficient times diameter."""
 P = PARAMS.at
@@ -57,7 +60,8 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             velocities[i], wind, half_rho * params[P.drone_area], params[P.drone_linear],
             external[i],
         )  # fmt: skip
-        if params[P.rotor_drag] > 0.0:
+        rotor_drag = params[P.rows + P.width * i + P.rotor_drag]
+        if rotor_drag > 0.0:
             # In the rotors' plane, in proportion to thrust: blades flap and drag unevenly.
             axis = quaternion.third_axis(
                 attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3]
@@ -67,7 +71,7 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 along += axis[k] * (wind[k] - velocities[i, k])
             for k in range(3):
                 across = wind[k] - velocities[i, k] - along * axis[k]
-                external[i, k] += params[P.rotor_drag] * thrusts[i] * across
+                external[i, k] += rotor_drag * thrusts[i] * across
         if attached[i] == 0.0 or params[P.cable] == 0.0:
             continue
         length = 0.0
@@ -100,6 +104,8 @@ class Drag(DisturbancePart):
 
     kernel = _drag
     feels_wind: ClassVar[bool] = True
+    per_drone = ("rotor_drag",)
+    from_team: ClassVar[Mapping[str, float | None]] = {"rotor_drag": 0.0}
 
     air_density: Annotated[float, Field(ge=0.0, le=10.0)] = 1.225
     """kg/m^3."""
@@ -111,17 +117,21 @@ class Drag(DisturbancePart):
     """Drag coefficient times frontal area of the load, m^2 (about that of a cube of 7.5 cm)."""
     load_linear: Linear = 0.0
     """Linear drag of the load, N s/m."""
-    rotor_drag: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """Force in the rotors' plane per thrust and speed across it, s/m; small racing quadrotors have some
-    0.05, that is half their weight at 10 m/s."""
+    rotor_drag: RotorDrag | list[RotorDrag] | None = None
+    """Force in the rotors' plane per thrust and speed across it, s/m; one value, or one for each drone. Small racing
+    quadrotors have some 0.05, that is half their weight at 10 m/s. None: ``drones.rotor_drag``, or 0."""
     cable_diameter: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0015
     """m."""
     cable_coefficient: Annotated[float, Field(ge=0.0, le=3.0)] = 1.2
     """Drag coefficient of the cables across the wind (a cylinder's below Re = 10^5)."""
 
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        return {"rotor_drag": team.rotor_drags}
+
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(
             team.n, density=self.air_density, drone_area=self.drone_area,
             drone_linear=self.drone_linear, load_area=self.load_area, load_linear=self.load_linear,
-            rotor_drag=self.rotor_drag, cable=self.cable_diameter * self.cable_coefficient,
+            rotor_drag=self.settled("rotor_drag", team),
+            cable=self.cable_diameter * self.cable_coefficient,
         )  # fmt: skip

@@ -110,8 +110,8 @@ def limits_of(team: Team, settings: Safe, thrusts: Array | None = None) -> Limit
     told = settings.thrust_limits(team)
     return Limits(
         weights=team.masses * team.gravity,
-        low=settings.tension_floors(team.n),
-        high=settings.tension_caps(team.n),
+        low=settings.tension_floors(team),
+        high=settings.tension_caps(team),
         thrust=told if thrusts is None else np.minimum(told, thrusts),
         cone=math.radians(settings.max_cone_deg),
         min_angle=math.radians(settings.min_angle_deg),
@@ -188,20 +188,32 @@ def _heaviest(
     best = extreme(limits, starts)
     if not math.isfinite(best.weight):
         return 0.0, ()
-    found = []
+    found: dict[str, Binding] = {}
     for name, price in best.prices.items():
         part: Any = settings  # the part whose setting it is
         if name == "max_thrust" and actuation is not None:
             by_motors = actuation.thrust_limits(team) < settings.thrust_limits(team)
             if by_motors.any():
                 part, name = actuation, actuation.thrust_setting
-        if abs(price) < 0.01 or getattr(part, name, None) is None:
+        by_drones = name in ("max_thrust", "tension_max") and name in part.by_team(team)
+        if part is actuation and actuation.thrust_path(team).startswith("drones."):
+            by_drones = True
+        path, value, default = f"{part.layer}.{name}", getattr(part, name, None), False
+        if by_drones:
+            path, most = "drones.max_thrust", team.max_thrusts
+            value = float(most[0]) if np.all(most == most[0]) else most.tolist()
+        elif name in part.from_team:
+            value = part.filled(team).model_dump()[name]
+            default = name not in part.model_fields_set or value == part.from_team[name]
+        elif value is not None:
+            default = value == type(part).model_fields[name].default
+        if abs(price) < 0.01 or value is None:
             continue
-        value = getattr(part, name)
-        default = value == type(part).model_fields[name].default
+        if path in found:
+            price += found[path].price
         unit = " deg" if name.endswith("_deg") else " N"
-        found.append(Binding(f"{part.layer}.{name}", value, unit, default, price))
-    return best.weight, tuple(sorted(found, key=lambda each: -abs(each.price)))
+        found[path] = Binding(path, value, unit, default, price)
+    return best.weight, tuple(sorted(found.values(), key=lambda each: -abs(each.price)))
 
 
 def cannot_hold(team: Team, settings: Safe, thrusts: Array, directions: Array) -> list[str]:
@@ -358,15 +370,17 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
                     f"{math.degrees(angle):.1f} degrees apart",
                 )
             )
-    most = float(np.sum(settings.tension_caps(n)))
+    most = float(np.sum(settings.tension_caps(team)))
     if most < weight:
+        by_drones = "tension_max" in settings.by_team(team)
+        beside = ", what the drones lift beside themselves" if by_drones else ""
         found.append(
             (
-                "tension_max",
-                f"tension_max (together {most:.4g} N) conflicts with the load's weight of {weight:.4g} N",
+                "drones.max_thrust" if by_drones else "tension_max",
+                f"tension_max (together {most:.4g} N{beside}) conflicts with the load's weight of {weight:.4g} N",
             )
         )
-    lowest = float(np.sum(settings.tension_floors(n))) * math.cos(cone)
+    lowest = float(np.sum(settings.tension_floors(team))) * math.cos(cone)
     if lowest > weight:
         found.append(
             (
