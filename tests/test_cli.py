@@ -133,6 +133,29 @@ def test_list_names_missions_and_parts() -> None:
     listing = json.loads(colift("list", "--json").stdout)
     assert "paper-spiral" in listing["missions"]
     assert {"sqp", "ring", "lopsided"} <= set(listing["parts"]["allocation"])
+    assert listing["vehicles"]["x500"]["max_thrust"] == 34.2
+    assert "x500" in colift("list").stdout
+
+
+def test_an_estimated_inertia_is_told_before_the_flight(tmp_path: Path) -> None:
+    sets = [f"drones.{text}" for text in ("mass=1.7", "arm=0.24", "max_thrust=38")]
+    told = [word for text in sets for word in ("--set", text)]
+    judged = colift("feasibility", "hover", "--json", *told)
+    (note,) = json.loads(judged.stdout)["notes"]
+    assert note.startswith("drones.inertia: is estimated from mass and arm")
+    flown = colift(
+        "run",
+        "hover",
+        "--no-report",
+        *told,
+        "--set",
+        "timing.duration=0.1",
+        "--out",
+        str(tmp_path / "out"),
+    )
+    assert f"note: {note}" in flown.stderr
+    written = (tmp_path / "out" / "mission.toml").read_text()
+    assert 'inertia_from = "estimate"' in written
 
 
 def test_help_teaches() -> None:

@@ -253,6 +253,12 @@ def show_warnings(warnings: Iterable[object]) -> None:
         )
 
 
+def show_notes(notes: Iterable[object]) -> None:
+    """Say what was put in for what a mission leaves out, where it disturbs no output."""
+    for note in notes:
+        console(stderr=True).print(f"note: {note}", style="dim", markup=False, soft_wrap=True)
+
+
 def emit(value: Any) -> None:
     """Print one JSON object on standard output."""
     print(json.dumps(plain(value), indent=2))

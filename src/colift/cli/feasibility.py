@@ -19,6 +19,7 @@ from colift.cli.base import (
     emit,
     loading,
     out,
+    show_notes,
     show_warnings,
 )
 from colift.errors import ColiftError
@@ -46,7 +47,7 @@ def feasibility(
         import colift
         from colift.control.allocation.limits.feasibility import feasibility as judge
         from colift.control.allocation.safe import Safe
-        from colift.mission.warnings import warnings_of
+        from colift.mission.warnings import notes_of, warnings_of
 
         loaded = colift.load_mission(mission, parse_overrides(sets), must_fly=False)
     if not isinstance(loaded.allocation, Safe):
@@ -59,14 +60,16 @@ def feasibility(
     found = judge(
         team, part, loaded.actuation.of(drones), loaded.start_directions(), loaded.timing.allocation
     )
+    notes = [str(each) for each in notes_of(loaded)]
     warnings = [str(each) for each in warnings_of(loaded)]
     conflicts = [*found.conflicts, *loaded.attitude_control.diverges(loaded)]
     if not found.conflicts and (message := part.cannot_start(team, loaded.start_directions())):
         conflicts.append(message)
     if as_json:
-        _emit(loaded, found, conflicts, warnings)
+        _emit(loaded, found, conflicts, notes, warnings)
     else:
         _say(loaded, part, found)
+        show_notes(notes)
         show_warnings(warnings)
         for conflict in conflicts:
             out.print(f"[red]conflict[/red]: {escape(conflict)}", highlight=False)
@@ -87,7 +90,11 @@ def _wind(mission: Mission) -> str:
 
 
 def _emit(
-    mission: Mission, found: Feasibility, conflicts: Sequence[str], warnings: Sequence[str]
+    mission: Mission,
+    found: Feasibility,
+    conflicts: Sequence[str],
+    notes: Sequence[str],
+    warnings: Sequence[str],
 ) -> None:
     emit(
         {
@@ -99,7 +106,7 @@ def _emit(
             "most_cables_found": found.most_cables[0], "most_cables_bound": found.most_cables[1],
             "tensions_N": found.tensions.tolist(), "thrusts_N": found.thrusts.tolist(),
             "thrust_limits_N": found.thrust_limits.tolist(), "wind": _wind(mission),
-            "warnings": warnings,
+            "notes": notes, "warnings": warnings,
         }
     )  # fmt: skip
 

@@ -20,6 +20,7 @@ from colift.cli.base import (
     loading,
     new_folder,
     out,
+    show_notes,
     show_warnings,
     write_results,
 )
@@ -59,12 +60,13 @@ def fly(
 
     with loading():
         from colift.mission import load_mission
-        from colift.mission.warnings import warnings_of
+        from colift.mission.warnings import notes_of, warnings_of
         from colift.show.live.run import fly_live
 
         load_parts(extra)
         loaded = load_mission(mission, parse_overrides(sets))
 
+    show_notes(notes_of(loaded))
     show_warnings(warnings_of(loaded))
 
     def write(recording: Recording) -> Path:

@@ -28,6 +28,7 @@ from colift.cli.base import (
     progress,
     result_folder,
     show_files,
+    show_notes,
     show_verdict,
     show_warnings,
     write_results,
@@ -63,14 +64,15 @@ def run(
     check_out(folder, RUN_FILES)
     with loading():
         import colift
-        from colift.mission.warnings import warnings_of
+        from colift.mission.warnings import notes_of, warnings_of
 
         load_parts(extra)
         overrides = parse_overrides(sets)
         loaded = colift.load_mission(
             mission, {**overrides, **({} if seed is None else {"seed": seed})}
         )
-    warnings = warnings_of(loaded)
+    notes, warnings = notes_of(loaded), warnings_of(loaded)
+    show_notes(notes)
     show_warnings(warnings)
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
@@ -81,7 +83,7 @@ def run(
     except OSError as error:  # what was flown is told all the same
         unwritten = error
     if as_json:
-        _emit(flown, warnings, files, unwritten)
+        _emit(flown, notes, warnings, files, unwritten)
     else:
         _say(flown, files)
     if unwritten:
@@ -90,13 +92,18 @@ def run(
 
 
 def _emit(
-    flown: Run, warnings: Iterable[object], files: dict[str, Path], unwritten: OSError | None
+    flown: Run,
+    notes: Iterable[object],
+    warnings: Iterable[object],
+    files: dict[str, Path],
+    unwritten: OSError | None,
 ) -> None:
     verdict = flown.verdict
     emit(
         {
             "mission": flown.mission.name,
             "verdict": {"level": verdict.level, "reasons": verdict.reasons},
+            "notes": [str(each) for each in notes],
             "warnings": [str(each) for each in warnings],
             "outcome": flown.recording.outcome,
             "summary": verdict.sentence,
