@@ -32,6 +32,8 @@ export interface FlightInfo {
   summary: string;
   n: number;
   cable_lengths: number[];
+  /** From a drone's centre to its outermost tip, m, where that is known. */
+  radii: (number | null)[];
   /** Least angle that was asked for, if any was. */
   safe_angle_deg: number | null;
   /** Weight of the load and mean thrust of a drone, N: they set the length of arrows. */

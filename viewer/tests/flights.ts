@@ -12,6 +12,7 @@ export function info(n: number, changes: Partial<FlightInfo> = {}): FlightInfo {
     summary: "",
     n,
     cable_lengths: Array<number>(n).fill(1),
+    radii: Array<null>(n).fill(null),
     safe_angle_deg: null,
     weight: 2,
     thrust: 5,

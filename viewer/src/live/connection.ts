@@ -31,6 +31,7 @@ export interface Hello {
   name: string;
   n: number;
   cable_lengths: number[];
+  radii: (number | null)[];
   safe_angle_deg: number | null;
   knobs: Knob[];
   choices: Choice[];

@@ -167,6 +167,7 @@ function about(hello: Hello): FlightInfo {
     summary: "",
     n: hello.n,
     cable_lengths: hello.cable_lengths,
+    radii: hello.radii,
     safe_angle_deg: hello.safe_angle_deg,
     weight: mass * GRAVITY,
     thrust: 1,

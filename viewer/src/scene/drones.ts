@@ -50,7 +50,12 @@ export const drones: Maker = (flight, scale) => {
   const at = new Vector3();
   const aside = new Vector3();
   const attitude = new Quaternion();
-  const size = new Vector3().setScalar(scale.drone);
+  // As large as they are, or as the scene has them where that is not known.
+  const spans = Array.from({ length: n }, (_, i) => {
+    const radius = flight.info.radii[i] ?? null;
+    return radius === null ? scale.drone : radius / (ARM + ROTOR);
+  });
+  const size = new Vector3();
   return {
     object,
     paint(palette) {
@@ -66,7 +71,7 @@ export const drones: Maker = (flight, scale) => {
         const [w, x, y, z] = frame.attitudes.subarray(4 * i, 4 * i + 4);
         if (Number.isFinite(w! + x! + y! + z!)) attitude.set(x!, y!, z!, w!).normalize();
         else attitude.identity();
-        if (there) pose.compose(at, attitude, size);
+        if (there) pose.compose(at, attitude, size.setScalar(spans[i]!));
         else pose.copy(gone);
         meshes.hull.setMatrixAt(i, pose);
         meshes.front.setMatrixAt(i, pose);
@@ -81,7 +86,7 @@ export const drones: Maker = (flight, scale) => {
           const text = Number.isFinite(tension) ? `${i}  ${tension.toFixed(2)} N` : `${i}`;
           // Outwards from the load, where neither cable nor arrow is.
           aside.set(frame.positions[3 * i]! - frame.load[0]!, frame.positions[3 * i + 1]! - frame.load[1]!, 0);
-          if (aside.lengthSq() > 0) at.addScaledVector(aside.normalize(), 1.9 * scale.drone);
+          if (aside.lengthSq() > 0) at.addScaledVector(aside.normalize(), 1.9 * spans[i]!);
           labels.put(text, at, "drone");
         }
       }

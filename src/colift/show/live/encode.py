@@ -40,6 +40,9 @@ def hello(session: Session, role: str) -> str:
             "name": mission.name,
             "n": mission.drones.count,
             "cable_lengths": mission.team.cable_lengths.tolist(),
+            "radii": [
+                float(radius) if math.isfinite(radius) else None for radius in mission.team.radii
+            ],
             "safe_angle_deg": limits(mission).angle_deg,
             "legend": _legend(),
             "knobs": [

@@ -87,6 +87,7 @@ def _flight(
         "summary": verdict.summary if verdict.ok else "",
         "n": recording.n,
         "cable_lengths": mission.team.cable_lengths.tolist(),
+        "radii": [_number(radius) for radius in mission.team.radii],
         "safe_angle_deg": limits(mission).angle_deg,
         "weight": mission.load.mass * mission.world.gravity,
         "thrust": (mission.load.mass + mission.team.masses.sum())
