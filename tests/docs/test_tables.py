@@ -41,7 +41,9 @@ BLOCKS = {
     if page.is_relative_to(DOCS)
     for found in MARKED.finditer(page.read_text(encoding="utf-8"))
 }
-STORED = sorted({found["script"] for found in BLOCKS.values() if found["json"]} | {"errata"})
+STORED = sorted(
+    {found["script"] for found in BLOCKS.values() if found["json"]} | {"errata", "vehicles"}
+)
 """Scripts that write at once, from what they have stored or from closed forms."""
 
 
