@@ -30,6 +30,7 @@ class Air:
     def act(self, step=0, wind=(0.0, 0.0, 0.0)):
         writes, _ = self.part.call(
             self.team, self.memory, step=step, dt=self.dt, key=self.key, load=self.load,
+            ends=np.tile(self.load, (self.n, 1, 1)),
             positions=self.positions, velocities=self.velocities, attitudes=self.attitudes,
             directions=self.directions, direction_rates=self.direction_rates,
             applied_thrusts=self.thrusts, attached=self.attached, wind=np.array(wind, dtype=float),
