@@ -16,6 +16,7 @@ from pages import fill, stored, table
 from colift.control.allocation.limits.reach import out_of_reach
 from colift.kernel.math import shares
 from colift.study import safety
+from colift.team import Team
 
 SIZES = (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24)
 CASES = {
@@ -52,11 +53,17 @@ def settings(n, case):
     return safe.model_copy(update=changes), case.get("period", safety.PERIOD)
 
 
+def tensions_of(part, n):
+    """Least and largest tension (n,), N, of drones whose thrust nobody knows."""
+    team = Team.uniform(n)
+    return part.tension_floors(team), part.tension_caps(team)
+
+
 def reachable(force, before, tensions, answer, part, turn):
     """Whether IPOPT finds tensions and directions (n, 3) within every limit of the cycle that give the force."""
     solver, least, most = problem(force, before, part, turn)
     n = len(before)
-    low, high = part.tension_floors(n), part.tension_caps(n)
+    low, high = tensions_of(part, n)
     free = np.full(3 * n, math.inf)
     rng = np.random.default_rng(0)
     starts = [before, answer]
@@ -111,7 +118,7 @@ def misses(n, case, cycles, seed):
     """Cycles flown, those that missed force, those no plane explains, and those that need not have."""
     part, period = settings(n, case)
     turn = min(part.max_rate * period, 0.5)
-    limits = (part.tension_floors(n), part.tension_caps(n), turn, math.radians(part.max_cone_deg))
+    limits = (*tensions_of(part, n), turn, math.radians(part.max_cone_deg))
     flown = missed = open_ = avoidable = 0
     for family in safety.FAMILIES:
         for found in safety.answers(n, family, cycles, part, seed=seed, period=period):

@@ -29,8 +29,8 @@ def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
     thrust = team.masses[:, None] / sigma * (acceleration + [0, 0, team.gravity]) - w
     size = np.linalg.norm(thrust, axis=1)
     limits = [
-        part.tension_max / sigma - T,
-        T - part.tension_min / sigma,
+        part.tension_caps(team) / sigma - T,
+        T - part.tension_floors(team) / sigma,
         -w[:, 2] - math.cos(math.radians(part.max_cone_deg)) * T,
         part.max_thrust / sigma - size,
         thrust[:, 2] - math.cos(math.radians(part.max_tilt_deg)) * size,

@@ -21,7 +21,7 @@ def test_each_flies_with_its_own_defaults_and_all_are_judged_alike() -> None:
     for name in ("safe", "ring", "sqp"):
         mission = flown[name, "real-world"]
         assert mission.kinds["allocation"] == name
-        assert mission.allocation == type(mission.allocation)()
+        assert mission.allocation == type(mission.allocation)().filled(mission.team)
         assert {k: mission.criteria[k] for k in own} == own
         assert mission.criteria["max_tilt_deg"].max == 90.0
         # The paper's allocator asks for no angle; a contest does.

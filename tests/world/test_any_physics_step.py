@@ -58,19 +58,24 @@ def test_sensors():
     part = Noisy(
         **timing, load_period=0.01, tracking_period=0.01, tracking_dropout=0.2, position_bias=0.01
     )
-    n, histories = 2, []
+    n, histories, ages = 2, [], []
     for dt in STEPS:
-        team, rows = Team.uniform(n), []
+        team, rows, old = Team.uniform(n), [], []
         memory, measured = part.memory(team), {}
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
         for k in range(round(1.0 / dt) + 1):
             read, _ = part.call(team, memory, step=k, key=11, dt=dt, attitudes=upright, **measured)
             measured = read._asdict()
-            rows.append(np.concatenate([m.ravel() for m in read]))
+            old.append(measured["measured_ages"].copy())
+            samples = (m.ravel() for name, m in measured.items() if name != "measured_ages")
+            rows.append(np.concatenate([*samples]))
         histories.append(np.array(rows)[:: round(0.01 / dt)])
+        ages.append(np.array(old)[:: round(0.01 / dt)])
     # Delays of 7 and 1 ms are no multiples of 2 ms: they are rounded to 8 and 2 ms, before the next row.
     for other in histories[1:]:
         assert_array_equal(other, histories[0])
+    for other in ages[1:]:  # counted up step by step
+        np.testing.assert_allclose(other, ages[0], rtol=0.0, atol=1e-13)
     assert (np.diff(histories[0], axis=0) != 0.0).any(axis=0).all()
 
 
@@ -113,12 +118,13 @@ def mission(step, **changes):
     return load_mission(table, changes)
 
 
+TOLD = {"lag": 0.02, "delay": 0.02, "period": 0.01}
 COPING = {
     "estimation": {"kind": "predictor", "lag": 0.02},
-    "load_control": {"kind": "adaptive", "lag": 0.02},
+    "load_control": {"kind": "adaptive", **TOLD},
     "allocation": {"kind": "safe", "max_rate": 0.5},
-    "position_control": {"kind": "disturbance-observer", "lag": 0.02},
-    "attitude_control": {"kind": "delay-aware", "lag": 0.02},
+    "position_control": {"kind": "disturbance-observer", **TOLD},
+    "attitude_control": {"kind": "delay-aware", **TOLD},
 }
 """Controllers that cope with the motors and delays of this flight, so that no cable pushes and no motor saturates."""
 

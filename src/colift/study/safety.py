@@ -156,7 +156,7 @@ def problem(n: int) -> tuple[Team, Safe]:
     """Team and limits of the attacks: load and ``mu`` keep the paper's cone from four drones on; fewer carry its load."""
     size = max(n, PAPER_DRONES)
     team = Team.uniform(n, load_mass=scaled_load(size))
-    return team, Safe(mu=scaled_mu(size), min_angle_deg=LEAST_ANGLES.get(n, 30.0))
+    return team, Safe(mu=scaled_mu(size), min_angle_deg=LEAST_ANGLES.get(n, 30.0)).filled(team)
 
 
 class Answers(NamedTuple):
