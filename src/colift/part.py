@@ -12,6 +12,7 @@ import importlib.util
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, TypeVar
 
@@ -37,25 +38,42 @@ KIND = ("kind",)
 
 
 class Declared(Protocol):
-    """What a mission says to all parts, before there are any."""
+    """What a mission says to the parts that are to control it, before there are any."""
 
     @property
     def timing(self) -> Any:
         """Duration, physics step and periods, s, and the declared delay."""
         ...
 
+    @property
+    def sensing(self) -> Any:
+        """The part of this layer, as of the next one; None where it is not valid."""
+        ...
+
+    @property
+    def actuation(self) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What is said of a mission while its parts are being made."""
+
+    timing: Any
+    sensing: Any = None
+    actuation: Any = None
+
 
 class Setup(Declared, Protocol):
     """What a part may look at of the mission that it flies in, to warn before the flight."""
 
     @property
-    def kinds(self) -> Mapping[str, str]:
-        """Name of the part in each layer."""
+    def team(self) -> Team:
+        """What the controllers are told of drones, cables and load."""
         ...
 
     @property
-    def team(self) -> Team:
-        """What the controllers are told of drones, cables and load."""
+    def kinds(self) -> Mapping[str, str]:
+        """Name of the part in each layer."""
         ...
 
     @property
@@ -69,15 +87,9 @@ class Setup(Declared, Protocol):
         ...
 
     @property
-    def sensing(self) -> Any:
-        """The part of this layer, as of the next ones."""
+    def allocation(self) -> Any:
+        """The part of this layer."""
         ...
-
-    @property
-    def allocation(self) -> Any: ...
-
-    @property
-    def actuation(self) -> Any: ...
 
     @property
     def disturbance(self) -> Sequence[Any]:

@@ -50,8 +50,10 @@ def test_a_lag_that_nobody_told_the_controllers(section, kind):
         f"timing.{layer}": 0.01
         for layer in ("attitude_control", "position_control", "load_control")
     }
-    changes = {**periods, f"{section}.kind": kind, "actuation.kind": "motors"}
-    (text,) = (each for each in warned(changes) if each.startswith(section))
+    changes = {
+        **periods, f"{section}.kind": kind, f"{section}.lag": 0.0, "actuation.kind": "motors",
+    }  # fmt: skip
+    (text,) = (each for each in warned(changes) if each.startswith(f"{section}.lag"))
     assert text.startswith(
         f"{section}.lag: is 0 s, but actuation of kind motors has a lag of 0.02 s"
     )
@@ -76,7 +78,7 @@ def test_a_delay_shorter_than_the_sensors(section, kind, sensor):
         for layer in ("attitude_control", "position_control", "load_control")
     }
     changes = {**periods, f"{section}.kind": kind, "sensing.kind": "noisy",
-               f"sensing.{sensor}_delay": 0.03}  # fmt: skip
+               f"sensing.{sensor}_delay": 0.03, f"{section}.delay": 0.02}  # fmt: skip
     text = next(each for each in warned(changes) if each.startswith(f"{section}.delay"))
     assert f"is 0.02 s, but sensing.{sensor}_delay is 0.03 s" in text
     longer = warned({**changes, f"{section}.delay": 0.03})

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from colift.part import Setup
+from colift.kernel.jit import inline
+from colift.part import Declared, Part, Setup
 
 RATE_MARGIN = math.radians(60.0)
 """Phase margin of the body-rate loop."""
@@ -19,6 +20,9 @@ VELOCITY_MARGIN = math.radians(52.0)
 
 DOUBT = 0.25
 """Share of a predicted delay or lag that still counts: the prediction's model is not the truth."""
+
+MOST_VELOCITY = 12.0
+"""Most bandwidth of a velocity loop that moves cables, 1/s, however short the delay: they and the allocator have their own time."""
 
 LEAN = 0.5
 """Most that the wanted cable directions answer to a load error: metres that the drones move for a metre."""
@@ -33,17 +37,32 @@ class Bandwidths(NamedTuple):
     position: float
 
 
-class Delays(BaseModel):
+class Delays(Part):
     """What stands between a motion and the answer to it; the settings that delay-aware parts share."""
 
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
-    """Age of the measurements, s; ``timing.delay`` where the mission has one."""
+    """Age of the measurements, s; that of the mission's sensors, or its ``timing.delay``, where not given."""
     period: Annotated[float, Field(gt=0.0, le=0.5)] = 0.01
-    """Control period, s."""
+    """Control period, s; the layer's own in the mission where not given."""
     lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
-    """Time constant of the motors, s."""
+    """Time constant of the motors, s; that of the mission's where not given."""
     predicted: bool = True
     """Whether the delay is made up for by predictors (in the attitude controller and the estimator)."""
+
+    paced_by: ClassVar[str] = ""
+    """Layer at whose period the part is called, where it is not its own."""
+
+    @classmethod
+    def declared(cls, mission: Declared) -> dict[str, Any]:
+        found = {"period": getattr(mission.timing, cls.paced_by or cls.layer)}
+        if mission.sensing is not None:
+            delays = mission.sensing.delays()
+            found["delay"] = max(
+                (delays[sensor] for sensor in getattr(cls, "senses", ())), default=0.0
+            )
+        if mission.actuation is not None:
+            found["lag"] = mission.actuation.motor_lag()
+        return found | super().declared(mission)
 
     def bandwidths(self) -> Bandwidths:
         """The rule.
@@ -52,13 +71,13 @@ class Delays(BaseModel):
         ``pi/2 - w tau``; ``tau`` is the delay, half a period of the hold, and the motors' lag. What
         is predicted counts by a quarter. The angle's loop around it is critically damped at a quarter
         of ``w`` (so ``rho = w / 2``, for the manifold's ``q_e`` is half an angle). The velocity loop
-        sees ``tau`` and the lag ``1 / w`` of an attitude whose wanted rate is fed forward; position again
+        sees ``tau`` and the lag ``1 / w`` of an attitude whose wanted rate is fed forward, and is bounded; position again
         a quarter.
         """
         share = DOUBT if self.predicted else 1.0
         tau = share * (self.delay + self.lag) + 0.5 * self.period
         rate = (0.5 * math.pi - RATE_MARGIN) / tau
-        velocity = (0.5 * math.pi - VELOCITY_MARGIN) / (tau + 2.0 / rate)
+        velocity = min((0.5 * math.pi - VELOCITY_MARGIN) / (tau + 2.0 / rate), MOST_VELOCITY)
         return Bandwidths(rate, 0.25 * rate, velocity, 0.25 * velocity)
 
     def delay_warnings(self, mission: Setup, layer: str) -> Iterable[tuple[str, str]]:
@@ -122,6 +141,24 @@ def loop_growth(
     for k in range(whole):
         M[5 + 2 * k : 7 + 2 * k, 3 + 2 * k : 5 + 2 * k] = np.eye(2)
     return float(np.abs(np.linalg.eigvals(M)).max())
+
+
+@inline
+def pendulum_gains(g, height, band):  # type: ignore[no-untyped-def]
+    """Gains of ``a = -k1 y' - k2 y - k3 x' - k4 x`` for a load below one or two drones; y is their error, x the load's.
+
+    The load swings below drones that move freely, ``x'' = wp^2 (y - x)`` with ``wp^2 = g / height``. The poles are
+    those of ``s^2 + 2 zeta wp s + wp^2``, which damps the swing, and of ``s^2 + 2 zeta_b b s + b^2``, which brings the load to
+    its place. Both are held back where the swing comes near ``band``, the bandwidth of the velocity loop, 1/s.
+    """
+    wp = math.sqrt(max(g, 1e-3) / height)
+    slow = min(1.0, 0.4 * band / wp)
+    zeta, zeta_b = 0.5 * slow, 0.5
+    b = min(2.0 * slow * wp, 0.3 * band)
+    k1 = 2.0 * zeta * wp + 2.0 * zeta_b * b
+    k2 = b * b + 4.0 * zeta * zeta_b * wp * b
+    k3 = 2.0 * zeta * b * b / wp + 2.0 * zeta_b * b - k1
+    return k1, k2, k3, b * b - k2
 
 
 LONGEST = 50

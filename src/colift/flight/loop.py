@@ -88,6 +88,7 @@ _sense, _estimate = PORTS["sensing"].invoke, PORTS["estimation"].invoke
 _supervise = PORTS["supervision"].invoke
 _refer, _control_load = PORTS["reference"].invoke, PORTS["load_control"].invoke
 _allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
+_observe_forces = PORTS["observation"].invoke
 _control_position = PORTS["position_control"].invoke
 _control_attitude = PORTS["attitude_control"].invoke
 _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
@@ -160,6 +161,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             _transmit(wires.link, k, t, dt)
 
         if k % every.position_control == 0:
+            _observe_forces(wires.observation, k, t, every.position_control * dt)
             _control_position(wires.position_control, k, t, every.position_control * dt)
             _detect(wires.detection, k, t, every.position_control * dt)
 

@@ -225,7 +225,7 @@ PORTS: dict[str, Port] = {
         Port("estimation", sees=(*_named("measured"), "measured_ages", "thrusts", *_RECEIVED)),
         Port("supervision", sees=(*_named("estimated"), "thrusts", *_RECEIVED)),
         Port("reference", sees=()),
-        Port("load_control", sees=("estimated_load", "reference")),
+        Port("load_control", sees=("estimated_load", "reference", "estimated_forces")),
         Port("allocation", sees=("force", "reference", "nominal_forces"), answers=True),
         Port("link", sees=("desired_tensions", "desired_directions")),
         Port("network", sees=("outboxes",)),
@@ -235,9 +235,13 @@ PORTS: dict[str, Port] = {
             answers=True,
             table={signal.name: signal for signal in OF_ONE},
         ),
+        Port("observation", sees=(*_named("estimated"), "estimated_ends", "thrusts", *_RECEIVED)),
         Port(
             "position_control",
-            sees=(*_named("estimated")[1:], "wanted_ends", "nominal_forces", *_RECEIVED),
+            sees=(
+                *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
+                "reference", "wanted_ends", "nominal_forces", *_RECEIVED,
+            ),
         ),
         Port(
             "attitude_control",

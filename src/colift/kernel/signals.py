@@ -83,6 +83,8 @@ SIGNALS = (
     Signal("estimated_attitudes", ("n", 4), "1", "-", "body to world", "drone attitudes that the controllers use, wxyz", writer="estimation"),
     Signal("estimated_rates", ("n", 3), "rad/s", "-", "body", "drone body rates that the controllers use", writer="estimation"),
     Signal("estimated_ages", ("n+1", 3), "s", "-", "-", "the same of the estimates, less the time over which they were carried forward", writer="estimation"),
+    Signal("estimated_forces", ("n+1", 3), "N", "-", "world", "external forces on the drones and, last, the load that the controllers know of", writer="observation"),
+    Signal("estimated_wind", (3,), "m/s", "-", "world", "velocity of the air that the controllers reckon with", writer="observation"),
     Signal("received_tensions", ("n",), "N", "-", "-", "wanted tensions that have reached the drones", writer="link"),
     Signal("received_directions", ("n", 3), "1", "-", "world", "wanted directions that have reached the drones", writer="link"),
     Signal("received_ages", ("n",), "s", "-", "-", "time since what each drone has received was sent", writer="link"),
@@ -129,7 +131,7 @@ NOMINAL = Signal(
 ENDS = (
     Signal("ends", ("n", 2, 3), "m, m/s", "-", "world", "places and velocities of the cables' ends on the load", writer="plant_observe"),
     Signal("estimated_ends", ("n", 2, 3), "m, m/s", "-", "world", "those that the controllers use, of the estimated load"),
-    Signal("wanted_ends", ("n", 3, 3), "m, m/s, m/s^2", "-", "world", "those of the wanted load, with accelerations"),
+    Signal("wanted_ends", ("n", 4, 3), "m, m/s, m/s^2, m/s^3", "-", "world", "those of the wanted load, with accelerations and jerks"),
 )  # fmt: skip
 """Not recorded, as they follow from the load (:mod:`colift.kernel.load`); the loop writes those without a writer."""
 

@@ -16,7 +16,7 @@ from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
 from colift.mission.criteria import METRICS
 from colift.mission.schema import Frame, Section, Timing
-from colift.part import KIND, Part, find, kind_of, placed
+from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
@@ -193,6 +193,7 @@ def _with_paths(
 def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> Iterable[Problem]:
     """Mistakes in the events, in the order in which they happen."""
     n, timing, present = frame.drones.count, frame.timing, dict(parts)
+    told = Declaration(timing, parts.get("sensing"), parts.get("actuation"))
     left = set(range(n))
     if all(type(e.value) is int for e in frame.events if e.of_team):
         left = set(frame.first_drones())
@@ -214,10 +215,10 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
                         f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
                     )
         elif event.field in present:
-            yield from _section_change(f"events.{i}", event.field, event.value, present, frame)
+            yield from _section_change(f"events.{i}", event.field, event.value, present, told)
         elif event.field == "allocation.kind":
             table = {"kind": event.value}
-            yield from _section_change(f"events.{i}", section, table, present, frame)
+            yield from _section_change(f"events.{i}", section, table, present, told)
         elif name == "kind":
             message = f"to put another part in place give the whole section {section}"
             yield Problem(f"events.{i}.field", event.field, message)
@@ -228,7 +229,7 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
 
 
 def _section_change(
-    path: str, section: str, table: Any, present: dict[str, Part], frame: Frame
+    path: str, section: str, table: Any, present: dict[str, Part], told: Declared
 ) -> Iterable[Problem]:
     """Mistakes of a part that takes the place of another, which is brought up to date."""
     if not isinstance(table, dict) or "kind" not in table:
@@ -245,7 +246,7 @@ def _section_change(
         yield Problem(f"{path}.value", shown(table["kind"]), message)
         return
     try:
-        present[section] = parse(part, {**part.declared(frame), **settings})
+        present[section] = parse(part, {**part.declared(told), **settings})
     except ValidationError as error:
         for problem in problems_of(error, part, settings, section, KIND):
             yield Problem(path, problem.value, f"{problem.path} {problem.message}")

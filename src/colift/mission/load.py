@@ -7,6 +7,7 @@ import json
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from colift.errors import MissionError, Problem, SettingError, UnknownNameError
 from colift.mission.checks import cross_checks, hover_checks
 from colift.mission.mission import Mission
 from colift.mission.schema import Frame
-from colift.part import KIND, Part, find, names
+from colift.part import KIND, Declaration, Declared, Part, find, names
 from colift.team.vehicles import NUMBERS
 from colift.wording import parse, problems_of, shown
 
@@ -221,10 +222,18 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
     kinds: dict[str, str] = {}
     rest = {name: section for name, section in table.items() if name not in (*LAYERS, *LISTS)}
     frame, mistakes = _frame(rest)
-    for layer in LAYERS:
-        found = _part(layer, table.get(layer, {}), layer, frame, problems)
+    told = Declaration(frame.timing)
+    for layer in sorted(LAYERS, key=lambda layer: layer not in ("sensing", "actuation")):
+        found = _part(layer, table.get(layer, {}), layer, told, problems)
         if found is not None:
             kinds[layer], parts[layer] = found
+            if layer in ("sensing", "actuation"):
+                known: dict[str, Any] = {layer: parts[layer]}
+                if not frame.drones.problems():
+                    known[layer] = parts[layer].filled(frame.team)
+                told = replace(told, **known)
+    kinds = {layer: kinds[layer] for layer in LAYERS if layer in kinds}
+    parts = {layer: parts[layer] for layer in LAYERS if layer in parts}
     lists: dict[str, list[Part]] = {}
     list_kinds: dict[str, list[str]] = {}
     for name in LISTS:
@@ -233,7 +242,7 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
             problems.append(Problem(name, shown(sections), f"must be a list of tables, [[{name}]]"))
             sections = []
         each = [
-            _part(name, section, f"{name}.{i}", frame, problems)
+            _part(name, section, f"{name}.{i}", told, problems)
             for i, section in enumerate(sections)
         ]
         list_kinds[name] = [item[0] for item in each if item]
@@ -265,7 +274,7 @@ def _frame(table: dict[str, Any]) -> tuple[Frame, list[Problem]]:
 
 
 def _part(
-    layer: str, section: Any, path: str, frame: Frame, problems: list[Problem]
+    layer: str, section: Any, path: str, told: Declared, problems: list[Problem]
 ) -> tuple[str, Part] | None:
     """Name and settings of the part that a section asks for; None, and problems, where it cannot."""
     if not isinstance(section, dict):
@@ -286,7 +295,7 @@ def _part(
         problems.append(Problem(f"{path}.kind", shown(kind), f"must be one of {valid}{hint}"))
         return None
     try:
-        return str(kind), parse(part, {**part.declared(frame), **settings})
+        return str(kind), parse(part, {**part.declared(told), **settings})
     except ValidationError as error:
         problems.extend(problems_of(error, part, settings, path, KIND))
         return None

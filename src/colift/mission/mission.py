@@ -13,6 +13,7 @@ from colift.control.attitude_control.base import AttitudeControlPart
 from colift.control.detection.base import DetectionPart
 from colift.control.estimation.base import EstimationPart
 from colift.control.load_control.base import LoadControlPart
+from colift.control.observation.base import ObservationPart
 from colift.control.position_control.base import PositionControlPart
 from colift.control.reference.base import ReferencePart
 from colift.control.supervision.base import SupervisionPart
@@ -48,6 +49,7 @@ class Mission(Described):
     link: SerializeAsAny[LinkPart]
     network: SerializeAsAny[NetworkPart]
     agents: SerializeAsAny[AgentPart]
+    observation: SerializeAsAny[ObservationPart]
     position_control: SerializeAsAny[PositionControlPart]
     attitude_control: SerializeAsAny[AttitudeControlPart]
     actuation: SerializeAsAny[ActuationPart]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -23,11 +23,16 @@ from colift.team import Team
 YAW = 0.25
 """Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
 
+TILTING, YAWING = 1.1, 0.9
+"""Most torque asked for, over what all rotors between hover and their nearer limit give: a little more is clipped by the mixer."""
+
+Acceleration = Annotated[float, Field(gt=0.0, le=1e5)]
+
 _MOST = 64  # control periods that a predicted delay may last
 
 PARAMS = Layout(
-    team={"delay": 1, "lag": 1, "rho": 3, "most": 3, "coast": 1, "steady": 1},
-    drone={"J": 3, "K_d": 3},
+    team={"delay": 1, "lag": 1, "rho": 3, "coast": 1, "steady": 1},
+    drone={"J": 3, "K_d": 3, "most": 3},
 )
 """``most``: angular acceleration; ``coast``: how long silence is made up for, from ``steady`` on."""
 MEMORY = Layout(drone={"past": 3 * _MOST, "acting": 3, "age": 1, "silence": 1})
@@ -94,7 +99,7 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
             for k in range(3):
                 memory[was + 3 * j + k] = memory[was + 3 * (j - 1) + k]
         for k in range(3):
-            J, K_d, most = params[c + P.J + k], params[c + P.K_d + k], params[P.most + k]
+            J, K_d, most = params[c + P.J + k], params[c + P.K_d + k], params[c + P.most + k]
             # No faster towards the wanted attitude than half of the torque can stop.
             cap = math.sqrt(2.0 * most * abs(errors[k]))
             turn = min(max(params[P.rho + k] * errors[k], -cap), cap)
@@ -123,15 +128,33 @@ class DelayAware(AttitudeControlPart, Delays):
     delays_declared = ("delay",)
     gain_setting: ClassVar[str] = "delay"
 
-    max_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 40.0
-    """Most angular acceleration in roll and pitch, rad/s^2."""
-    max_yaw_acceleration: Annotated[float, Field(gt=0.0, le=1e4)] = 2.0
-    """Most angular acceleration in yaw, for which rotors have little torque, rad/s^2."""
+    per_drone = ("max_acceleration", "max_yaw_acceleration")
+    from_team: ClassVar[Mapping[str, float | None]] = {
+        "max_acceleration": 40.0,
+        "max_yaw_acceleration": 2.0,
+    }
+
+    max_acceleration: Acceleration | list[Acceleration] | None = None
+    """Most angular acceleration in roll and pitch, rad/s^2. None: what the rotors can give beside their hover thrust where
+    the drones' thrust, arm and rotors are known, or 40."""
+    max_yaw_acceleration: Acceleration | list[Acceleration] | None = None
+    """Most angular acceleration in yaw, for which rotors have little torque, rad/s^2. None: likewise, or 2."""
 
     coast: Annotated[float, Field(ge=0.0, le=1.0)] = 0.1
     """How long the attitude is predicted without a new measurement, s."""
     steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
     """Silence that is only the sensor's sampling, which the estimator makes up for, s."""
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        hover = (team.masses + team.load_mass / team.n) * team.gravity
+        spare = np.maximum(np.minimum(hover, team.max_thrusts - hover), 0.05 * hover)
+        spare = np.where(np.isfinite(team.max_thrusts), spare, math.nan)
+        lever = np.where(team.rotors > 4, 0.5, math.sqrt(0.5)) * team.arms
+        tilting = TILTING * lever * spare / team.inertias[:, :2].max(axis=1)
+        return {
+            "max_acceleration": tilting,
+            "max_yaw_acceleration": YAWING * team.torque_ratios * spare / team.inertias[:, 2],
+        }
 
     def gains(self, team: Team) -> tuple[Vector, Vector, Vector]:
         rate = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
@@ -147,7 +170,8 @@ class DelayAware(AttitudeControlPart, Delays):
     def params(self, team: Team) -> Vector:
         span, lag, coast = (self.delay, self.lag, self.coast) if self.predicted else (0.0, 0.0, 0.0)
         gains = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
-        most = [self.max_acceleration, self.max_acceleration, self.max_yaw_acceleration]
+        turning = self.settled("max_acceleration", team)
+        most = np.column_stack([turning, turning, self.settled("max_yaw_acceleration", team)])
         return PARAMS.pack(
             team.n, delay=span, lag=lag, rho=0.5 * gains, most=most, coast=coast, steady=self.steady,
             J=team.inertias, K_d=gains * team.inertias,

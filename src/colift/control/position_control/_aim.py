@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 from colift.kernel.jit import inline
 from colift.kernel.math import quaternion
 from colift.kernel.rounding import NO_THRUST
 
 AIM = 6
-"""Numbers that it remembers of a drone."""
+"""Numbers that :func:`aim` remembers of a drone."""
+AIM_ALONG = 9
+"""And :func:`aim_along`."""
 
 
 @inline
@@ -35,6 +39,42 @@ def aim(i, fresh, dt, keep, u, norm, memory, o, thrusts, attitudes, rates):  # t
     memory[o + 3] = dx
     memory[o + 4] = dy
     memory[o + 5] = dz
+    _command(i, hx, hy, hz, dx, dy, dz, attitudes, rates)
+
+
+@inline
+def aim_along(i, fresh, dt, keep, planned, u, norm, memory, o, thrusts, attitudes, rates):  # type: ignore[no-untyped-def]
+    """The same where a part of the thrust vector, ``planned`` (3,), is free of noise: its turning is not filtered.
+
+    ``memory[o : o + 9]`` holds the last planned direction, then the last difference from it and its filtered rate.
+    """
+    thrusts[i] = norm
+    hx, hy, hz = _unit(u[i, 0], u[i, 1], u[i, 2])
+    px, py, pz = _unit(planned[0], planned[1], planned[2])
+    h, p = (hx, hy, hz), (px, py, pz)
+    for k in range(3):
+        if fresh:
+            memory[o + k] = p[k]
+            memory[o + 3 + k] = h[k] - p[k]
+        step = (h[k] - p[k] - memory[o + 3 + k]) / dt
+        memory[o + 6 + k] = (1.0 - keep) * step + keep * memory[o + 6 + k]
+        memory[o + 3 + k] = h[k] - p[k]
+    dx = memory[o + 6] + (px - memory[o]) / dt
+    dy = memory[o + 7] + (py - memory[o + 1]) / dt
+    dz = memory[o + 8] + (pz - memory[o + 2]) / dt
+    memory[o], memory[o + 1], memory[o + 2] = px, py, pz
+    _command(i, hx, hy, hz, dx, dy, dz, attitudes, rates)
+
+
+@inline
+def _unit(x, y, z):  # type: ignore[no-untyped-def]
+    norm = math.sqrt(x * x + y * y + z * z)
+    return (x / norm, y / norm, z / norm) if norm > NO_THRUST else (0.0, 0.0, 1.0)
+
+
+@inline
+def _command(i, hx, hy, hz, dx, dy, dz, attitudes, rates):  # type: ignore[no-untyped-def]
+    """Attitude and rate of drone i for a thrust direction and its derivative."""
     qw, qx, qy, qz = quaternion.from_thrust_direction(hx, hy, hz)
     attitudes[i, 0] = qw
     attitudes[i, 1] = qx

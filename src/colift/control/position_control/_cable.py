@@ -46,3 +46,51 @@ def lead(i, alpha, nominal, omega, dt, memory, o, reach):  # type: ignore[no-unt
         memory[o + k] = direction + memory[c + k]
         memory[o + 3 + k] = rate + speed
         memory[o + 6 + k] = turning + (speed - before) / dt
+
+
+SWING = 6
+"""Numbers that :func:`swing` remembers of a cable beside its direction, rate and acceleration."""
+
+
+@inline
+def swing(i, alpha, T, change, omega, dt, memory, o, reach):  # type: ignore[no-untyped-def]
+    """Lead a cable of a team of one or two, where the load's motion is the cable's: that part passes unfiltered.
+
+    ``change`` (9,) is what the reference's acceleration adds to this cable's pull, and two derivatives. The pull that is
+    left of ``T[i] alpha[i]`` goes through a critically damped filter of the frequency ``omega``; of their
+    sum the direction, its rate and acceleration are put into ``memory[o : o + 9]``.
+    """
+    damp = 1.0 / (1.0 + 2.0 * omega * dt)
+    c = o + 9
+    size = T[i] * reach
+    away = 0.0
+    for k in range(3):
+        away += (T[i] * alpha[i, k] - change[k] - memory[c + k]) ** 2
+    share = min(1.0, size / math.sqrt(max(away, 1e-18)))
+    norm = 0.0
+    for k in range(3):
+        before = memory[c + 3 + k]
+        off = share * (T[i] * alpha[i, k] - change[k] - memory[c + k])
+        speed = (before + dt * omega * omega * off) * damp
+        memory[c + 3 + k] = speed
+        memory[c + k] += dt * speed
+        # Pull, and in place of rate and acceleration its derivatives.
+        memory[o + k] = memory[c + k] + change[k]
+        memory[o + 3 + k] = speed + change[3 + k]
+        memory[o + 6 + k] = (speed - before) / dt + change[6 + k]
+        norm += memory[o + k] * memory[o + k]
+    norm = math.sqrt(max(norm, 1e-18))
+    stretch = stretch2 = 0.0
+    for k in range(3):
+        memory[o + k] /= norm
+        stretch += memory[o + k] * memory[o + 3 + k]
+    for k in range(3):
+        memory[o + 3 + k] = (memory[o + 3 + k] - memory[o + k] * stretch) / norm
+        stretch2 += memory[o + k] * memory[o + 6 + k]
+    turn = 0.0
+    for k in range(3):
+        turn += memory[o + 3 + k] * memory[o + 3 + k]
+    for k in range(3):
+        # d'' = (p'' - d (d.p'') - 2 d' (d.p')) / |p| - d |d'|^2
+        along = stretch2 * memory[o + k] + 2.0 * stretch * memory[o + 3 + k]
+        memory[o + 6 + k] = (memory[o + 6 + k] - along) / norm - memory[o + k] * turn

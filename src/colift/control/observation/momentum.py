@@ -1,0 +1,216 @@
+"""Observers of momentum: of the whole team, which needs no tension, and of each drone across its cable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from colift.control.observation.base import SIGNATURE, ObservationPart
+from colift.control.tuning import Delays
+from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math import quaternion, rotors
+from colift.kernel.math.small import solve_symmetric
+from colift.kernel.math.smooth import decay
+from colift.part import Setup, Vector
+from colift.team import Team
+
+PARAMS = Layout(
+    team={
+        "g": 1, "m_L": 1, "total": 1, "own": 1, "limit": 1, "lag": 1, "delay": 1, "breeze": 1,
+        "rotors": 1,
+    },
+    drone={"m": 1, "drag": 1},
+)  # fmt: skip
+"""Bandwidths of the observers of the ``total`` momentum and of each drone's ``own``, 1/s; ``limit`` over weight."""
+MEMORY = Layout(
+    team={"started": 1, "momentum": 3, "common": 3, "wind": 3},
+    drone={"own": 3, "felt": 3, "direction": 3, "thrust": 1},
+)
+"""``momentum`` and ``own``: as far as explained; ``felt``: force beyond thrust, weight and the wanted pull; ``common``: per mass."""
+P, M = PARAMS.at, MEMORY.at
+
+DOUBT = 0.05
+"""Difference from the common wind, in g, from which the observation of a drone counts for little."""
+
+Drag = Annotated[float, Field(ge=0.0, le=1.0)]
+
+MOST = 40.0
+"""Most wind that is believed along an axis, m/s."""
+
+
+@inline
+def _common(n, params, memory):  # type: ignore[no-untyped-def]
+    """The force per mass that all drones feel alike, by weighted least squares of what they feel across their cables.
+
+    Whose observation differs much from the last answer counts for little (Cauchy's weight): it has troubles of its own.
+    """
+    c = M.common
+    xx = yy = zz = 1e-6
+    xy = xz = yz = bx = by = bz = 0.0
+    scale = DOUBT * max(params[P.g], 1e-3)
+    for i in range(n):
+        o, m = M.rows + M.width * i, params[P.rows + P.width * i + P.m]
+        a, d = o + M.direction, o + M.felt
+        ax, ay, az = memory[a], memory[a + 1], memory[a + 2]
+        dx, dy, dz = memory[d] / m, memory[d + 1] / m, memory[d + 2] / m
+        rx, ry, rz = dx - memory[c], dy - memory[c + 1], dz - memory[c + 2]
+        along = ax * dx + ay * dy + az * dz
+        strange = ax * rx + ay * ry + az * rz
+        s = 1.0 / (1.0 + (rx * rx + ry * ry + rz * rz - strange * strange) / (scale * scale))
+        xx, yy, zz = xx + s * (1.0 - ax * ax), yy + s * (1.0 - ay * ay), zz + s * (1.0 - az * az)
+        xy, xz, yz = xy - s * ax * ay, xz - s * ax * az, yz - s * ay * az
+        bx, by, bz = (
+            bx + s * (dx - along * ax),
+            by + s * (dy - along * ay),
+            bz + s * (dz - along * az),
+        )
+    return solve_symmetric(xx, xy, xz, yy, yz, zz, bx, by, bz)
+
+
+@kernel(SIGNATURE)
+def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    load, x, v = sees.estimated_load, sees.estimated_positions, sees.estimated_velocities
+    q, Omega, thrusts = sees.estimated_attitudes, sees.estimated_rates, sees.thrusts
+    ends = sees.estimated_ends
+    T, forces, wind = sees.received_tensions, writes.estimated_forces, writes.estimated_wind
+    n = x.shape[0]
+    g, m_L = params[P.g], params[P.m_L]
+    total, own, delay = params[P.total], params[P.own], params[P.delay]
+    lag = decay(dt, params[P.lag])
+    fresh = memory[M.started] == 0.0
+    memory[M.started] = 1.0
+    weight = pull_of_wind = 0.0
+    for i in range(n):
+        o, m = M.rows + M.width * i, params[P.rows + P.width * i + P.m]
+        weight += m * g
+        # Along the cable wind cannot be told from tension.
+        size = 0.0
+        for k in range(3):
+            memory[o + M.direction + k] = ends[i, 0, k] - x[i, k]
+            size += memory[o + M.direction + k] ** 2
+        size = 1.0 / math.sqrt(max(size, 1e-12))
+        for k in range(3):
+            memory[o + M.direction + k] *= size
+        if fresh:
+            memory[o + M.thrust] = thrusts[i]
+            for k in range(3):
+                memory[o + M.own + k] = m * v[i, k]
+        else:
+            # The thrust along the axis that is there, not the one that is wanted.
+            thrust = lag * memory[o + M.thrust] + (1.0 - lag) * thrusts[i]
+            memory[o + M.thrust] = thrust
+            qw, qx, qy, qz = quaternion.turn(
+                q[i, 0], q[i, 1], q[i, 2], q[i, 3],
+                Omega[i, 0] * delay, Omega[i, 1] * delay, Omega[i, 2] * delay,
+            )  # fmt: skip
+            axis = quaternion.third_axis(qw, qx, qy, qz)
+            drag = params[P.rows + P.width * i + P.drag]
+            pull_of_wind += drag * thrust
+            past = (
+                memory[M.wind] - v[i, 0],
+                memory[M.wind + 1] - v[i, 1],
+                memory[M.wind + 2] - v[i, 2],
+            )
+            blown = rotors.drag(thrust, axis, drag, past)
+            for k in range(3):
+                known = thrust * axis[k] + blown[k] - (m * g if k == 2 else 0.0)
+                memory[M.momentum + k] += dt * known
+                pull = T[i] * memory[o + M.direction + k]
+                memory[o + M.own + k] += dt * (known + pull + memory[o + M.felt + k])
+                memory[o + M.felt + k] = own * (m * v[i, k] - memory[o + M.own + k])
+    cx, cy, cz = _common(n, params, memory)
+    common = (cx, cy, cz)
+    if pull_of_wind > 0.0:
+        # What is common is wind, by and by, and rotors drag in it in proportion to their thrust.
+        share = dt * params[P.breeze] * weight / (max(g, 1e-3) * pull_of_wind)
+        for k in range(2):
+            modelled = pull_of_wind * memory[M.wind + k] * max(g, 1e-3) / weight
+            total_push = common[k] + modelled
+            memory[M.wind + k] += share * (params[P.rotors] * total_push - modelled)
+            memory[M.wind + k] = min(max(memory[M.wind + k], -MOST), MOST)
+    for k in range(3):
+        wind[k] = memory[M.wind + k]
+    bound = params[P.limit] * weight
+    size = 0.0
+    for k in range(3):
+        memory[M.common + k] = common[k]
+        momentum = m_L * load[1, k]
+        for i in range(n):
+            momentum += params[P.rows + P.width * i + P.m] * v[i, k]
+        if fresh:
+            memory[M.momentum + k] = momentum
+        else:
+            memory[M.momentum + k] -= dt * m_L * g if k == 2 else 0.0
+        forces[n, k] = total * (momentum - memory[M.momentum + k])
+        size += forces[n, k] ** 2
+    shrink = bound / math.sqrt(size) if size > bound * bound else 1.0
+    for k in range(3):
+        if shrink < 1.0:
+            memory[M.momentum + k] += (1.0 - shrink) * forces[n, k] / total
+            forces[n, k] *= shrink
+        memory[M.momentum + k] += dt * forces[n, k]
+    for i in range(n):
+        o, m = M.rows + M.width * i, params[P.rows + P.width * i + P.m]
+        along = 0.0
+        for k in range(3):
+            along += memory[o + M.direction + k] * (m * common[k] - memory[o + M.felt + k])
+        size = 0.0
+        for k in range(3):
+            forces[i, k] = memory[o + M.felt + k] + along * memory[o + M.direction + k]
+            size += forces[i, k] ** 2
+        bound = params[P.limit] * m * g
+        shrink = bound / math.sqrt(size) if size > bound * bound else 1.0
+        for k in range(3):
+            forces[i, k] *= shrink
+            forces[n, k] -= forces[i, k]
+
+
+class Momentum(ObservationPart, Delays):
+    """What drives the team as a whole, and of it the wind on each drone; the load has the rest.
+
+    ``D = w (P - Phat)`` with ``P = sum m_i v_i + m_L v_L`` and ``dPhat/dt = sum u_i - M g e3 + D`` (a momentum observer,
+    De Luca and Mattone 2003): cables pull at both of their ends, so no tension enters. A wrong mass of the load is part of D.
+    An observer of each drone's own momentum finds what it feels beyond thrust, weight and the wanted pull: across the cable that is wind,
+    along it nobody can tell wind from tension. That part is filled in from the wind per mass that all feel alike.
+    """
+
+    kernel = _observe
+    remembers = MEMORY
+    delays_declared = ("delay",)
+
+    paced_by = "position_control"
+    per_drone = ("rotor_drag",)
+    from_team: ClassVar[Mapping[str, float | None]] = {"rotor_drag": 0.0}
+
+    total: Annotated[float, Field(gt=0.0, le=5.0)] = 0.765
+    """Bandwidth of the observer of the whole momentum over that of the velocity loop."""
+    own: Annotated[float, Field(gt=0.0, le=5.0)] = 0.46
+    """Bandwidth of that of each drone, likewise."""
+    rotor_drag: Drag | list[Drag] | None = None
+    """Force in the rotors' plane per thrust and speed across it, s/m. None: ``drones.rotor_drag``, or none."""
+    breeze: Annotated[float, Field(gt=0.0, le=5.0)] = 0.15
+    """How fast what all drones feel is taken for wind in their rotors, over the bandwidth of the velocity loop."""
+    rotors: Annotated[float, Field(gt=0.0, le=1.0)] = 0.7
+    """Share of what all drones feel that is the drag of rotors and not of bodies."""
+    limit: Annotated[float, Field(ge=0.0, le=10.0)] = 1.2
+    """Bound on a force over the drone's weight; on that of all, over the weight of all."""
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        return {"rotor_drag": team.rotor_drags}
+
+    def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
+        yield from self.delay_warnings(mission, "position_control")
+
+    def params(self, team: Team) -> Vector:
+        velocity = self.bandwidths().velocity
+        return PARAMS.pack(
+            team.n, g=team.gravity, m_L=team.load_mass, total=self.total * velocity,
+            own=self.own * velocity, drag=self.settled("rotor_drag", team),
+            breeze=self.breeze * velocity, rotors=self.rotors, limit=self.limit, lag=self.lag,
+            delay=self.delay if self.predicted else 0.0, m=team.masses,
+        )  # fmt: skip

@@ -1,0 +1,209 @@
+"""Hold the places of the formation, and damp the pendulum of a load that hangs on one or two drones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from colift.control.position_control._aim import AIM_ALONG, aim_along
+from colift.control.position_control._cable import CABLE, lead, swing
+from colift.control.position_control.base import SIGNATURE, PositionControlPart
+from colift.control.tuning import Delays, pendulum_gains
+from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math import rotors
+from colift.kernel.math.smooth import decay
+from colift.part import Setup, Vector
+from colift.team import Team
+
+PARAMS = Layout(
+    team={
+        "g": 1, "m_L": 1, "velocity": 1, "stiffness": 1, "band": 1, "frequency": 1,
+        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1,
+    },
+    drone={"m": 1, "L": 1, "least": 1, "most": 1, "drag": 1},
+)  # fmt: skip
+"""``band``: bandwidth of the velocity loop, 1/s; thrusts ``least`` and ``most``, N; ``total``: mass of all drones."""
+MEMORY = Layout(
+    team={"planned": 3},
+    drone={
+        "started": 1, "direction": CABLE, "aim": AIM_ALONG, "jerk": 3, "snap": 3, "change": 9,
+    },
+)  # fmt: skip
+"""``planned``: thrust vector as far as it is free of noise; ``change``: pull that the load's motion asks for, two derivatives."""
+P, M = PARAMS.at, MEMORY.at
+
+
+Thrust = Annotated[float, Field(gt=0.0, le=1e6)]
+Drag = Annotated[float, Field(ge=0.0, le=1.0)]
+
+FULL = 0.95
+"""Share of a drone's largest thrust that it is asked for."""
+UNKNOWN = 2.5
+"""Most thrust where nobody knows it, over the weight of a drone and its share of the load."""
+
+
+@inline
+def _limit(i, u, least, most, tangent):  # type: ignore[no-untyped-def]
+    """Clip a wanted thrust vector to what the drone can give; height goes before place."""
+    u[i, 2] = min(max(u[i, 2], least), most)
+    across = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1])
+    room = min(tangent * u[i, 2], math.sqrt(max(most * most - u[i, 2] * u[i, 2], 0.0)))
+    if across > room:
+        u[i, 0] *= room / across
+        u[i, 1] *= room / across
+
+
+@inline
+def _ask_for(i, share, wanted, dt, keep, memory, o):  # type: ignore[no-untyped-def]
+    """What the wanted motion of the end of cable i asks of it, with two derivatives; ``share`` of the load's mass, kg."""
+    for k in range(3):
+        jerk = wanted[i, 3, k]
+        step = 0.0 if memory[o + M.started] == 0.0 else (jerk - memory[o + M.jerk + k]) / dt
+        memory[o + M.jerk + k] = jerk
+        memory[o + M.snap + k] = keep * memory[o + M.snap + k] + (1.0 - keep) * step
+        memory[o + M.change + k] = -share * wanted[i, 2, k]
+        memory[o + M.change + 3 + k] = -share * jerk
+        memory[o + M.change + 6 + k] = -share * memory[o + M.snap + k]
+
+
+@kernel(SIGNATURE)
+def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    dt = now.dt
+    ends, x, v = sees.estimated_ends, sees.estimated_positions, sees.estimated_velocities
+    reference, wanted, forces = sees.reference, sees.wanted_ends, sees.estimated_forces
+    T, alpha, nominal = sees.received_tensions, sees.received_directions, sees.nominal_forces
+    u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
+    rates, planned = writes.desired_rates, memory[M.planned : M.planned + 3]
+    n = x.shape[0]
+    g, m_L, omega = params[P.g], params[P.m_L], params[P.frequency]
+    keep = decay(dt, params[P.thrust_filter])
+    # By how much what the cables are told to do for the load falls short: the drones do it together.
+    short_x = forces[n, 0] - m_L * reference[2, 0]
+    short_y = forces[n, 1] - m_L * reference[2, 1]
+    short_z = forces[n, 2] - m_L * (reference[2, 2] + g)
+    height = 0.0
+    for i in range(n):
+        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        d = o + M.direction
+        height += (x[i, 2] - ends[i, 0, 2]) / n
+        swinging = n <= 2 and math.isnan(nominal[i, 0, 0])
+        if swinging:
+            _ask_for(i, m_L / n, wanted, dt, keep, memory, o)
+        change = memory[o + M.change : o + M.change + 9]
+        if memory[o + M.started] == 0.0:
+            for k in range(3):
+                memory[d + k] = alpha[i, k]
+                if swinging:
+                    memory[d + 9 + k] = T[i] * alpha[i, k] - change[k]
+        reach = params[P.max_swing] / (omega * omega * L)
+        if swinging:
+            swing(i, alpha, T, change, omega, dt, memory, d, reach)
+        else:
+            lead(i, alpha, nominal, omega, dt, memory, d, reach)
+        short_x -= T[i] * memory[d]
+        short_y -= T[i] * memory[d + 1]
+        short_z -= T[i] * memory[d + 2]
+    short = (short_x, short_y, short_z)
+    k1, k2, k3, k4 = params[P.velocity], params[P.stiffness], 0.0, 0.0
+    if n <= 2:
+        L = params[P.rows + P.L]
+        k1, k2, k3, k4 = pendulum_gains(g, min(max(height, 0.2 * L), 2.0 * L), params[P.band])
+    for i in range(n):
+        p, o = P.rows + P.width * i, M.rows + M.width * i
+        m, L = params[p + P.m], params[p + P.L]
+        push = 0.0
+        for k in range(3):
+            a = o + M.direction + k
+            y = x[i, k] - (wanted[i, 0, k] - L * memory[a])
+            y_dot = v[i, k] - (wanted[i, 1, k] - L * memory[a + 3])
+            if k < 2:
+                u[i, k] = -k1 * y_dot - k2 * y - k3 * (ends[i, 1, k] - wanted[i, 1, k])
+                u[i, k] -= k4 * (ends[i, 0, k] - wanted[i, 0, k])
+            else:
+                u[i, k] = -params[P.velocity] * y_dot - params[P.stiffness] * y
+            push += u[i, k] * u[i, k]
+        # No more than the attitude can follow: it needs long to turn from one bank to the other.
+        most = min(1.0, params[P.max_push] / math.sqrt(max(push, 1e-12)))
+        for k in range(3):
+            a = o + M.direction + k
+            # Where the load swings freely, the drone carries it along the cable that is there.
+            pull = (ends[i, 0, k] - x[i, k]) / L if n <= 2 and k < 2 else memory[a]
+            needed = m * (wanted[i, 2, k] - L * memory[a + 6] + (g if k == 2 else 0.0))
+            planned[k] = needed - T[i] * memory[a]
+            known = T[i] * pull + forces[i, k] + m / params[P.total] * short[k]
+            u[i, k] = needed + m * most * u[i, k] - known
+        wind = sees.estimated_wind
+        past = (wind[0] - v[i, 0], wind[1] - v[i, 1], wind[2] - v[i, 2])
+        ux, uy, uz = rotors.thrust_for(u[i, 0], u[i, 1], u[i, 2], params[p + P.drag], past)
+        u[i, 0], u[i, 1], u[i, 2] = ux, uy, uz
+        _limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
+        norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
+        fresh = memory[o + M.started] == 0.0
+        memory[o + M.started] = 1.0
+        aim_along(
+            i, fresh, dt, keep, planned, u, norm, memory, o + M.aim, thrusts, attitudes, rates
+        )
+
+
+class Formation(PositionControlPart, Delays):
+    """PD on the places of the formation at gains that the delay allows; external forces are observed and made up for.
+
+    Together the drones make up for the whole of what the observers see, so that neither a wrong mass of the load nor
+    tensions that are not what was wanted leave an error. On one or two drones the load is a pendulum:
+    then four poles are placed, and the drone knows where its cable is.
+    """
+
+    kernel = _hold_formation
+    remembers = MEMORY
+    delays_declared = ("delay",)
+
+    per_drone = ("max_thrust", "rotor_drag")
+    from_team: ClassVar[Mapping[str, float | None]] = {"max_thrust": None, "rotor_drag": 0.0}
+
+    gain: Annotated[float, Field(gt=0.0, le=3.0)] = 0.85
+    """Gain of the velocity error over the bandwidth of the velocity loop."""
+    stiffness: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
+    """Gain of the position error over the square of that of the velocity error."""
+    frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.55
+    """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop."""
+    thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
+    """Time constant of the derivative of the thrust direction, times that bandwidth."""
+    max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
+    """Most acceleration that a drone is asked for to turn its cable, m/s^2."""
+    max_push: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
+    """Most acceleration by which place and speed are corrected, m/s^2."""
+    rotor_drag: Drag | list[Drag] | None = None
+    """Force in the rotors' plane per thrust and speed across it, s/m. None: ``drones.rotor_drag``, or none."""
+    min_thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
+    """Least vertical thrust over the drone's weight."""
+    max_thrust: Thrust | list[Thrust] | None = None
+    """Most thrust of a drone, N. None: 0.95 of ``drones.max_thrust``; where that is not known, 2.5 times what drone and share of
+    the load weigh."""
+    max_tilt_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 60.0
+    """Most tilt, degrees."""
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        known = np.isfinite(team.max_thrusts)
+        share = team.masses + team.load_mass / team.n
+        most = np.where(known, FULL * team.max_thrusts, UNKNOWN * share * max(team.gravity, 1e-3))
+        return {"max_thrust": most, "rotor_drag": team.rotor_drags}
+
+    def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
+        yield from self.delay_warnings(mission, "position_control")
+
+    def params(self, team: Team) -> Vector:
+        band = self.bandwidths().velocity
+        k = self.gain * band
+        return PARAMS.pack(
+            team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
+            band=band, frequency=self.frequency * band, thrust_filter=self.thrust_filter / band,
+            max_swing=self.max_swing, max_push=self.max_push,
+            tangent=math.tan(math.radians(self.max_tilt_deg)), total=float(team.masses.sum()),
+            m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,
+            most=self.settled("max_thrust", team), drag=self.settled("rotor_drag", team),
+        )  # fmt: skip
