@@ -49,6 +49,7 @@ class Delays(Part):
     predicted: bool = True
     """Whether the delay is made up for by predictors (in the attitude controller and the estimator)."""
 
+    delays_declared = ("delay",)
     paced_by: ClassVar[str] = ""
     """Layer at whose period the part is called, where it is not its own."""
 

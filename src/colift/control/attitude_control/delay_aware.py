@@ -125,7 +125,6 @@ class DelayAware(AttitudeControlPart, Delays):
 
     kernel = _delay_aware
     remembers = MEMORY
-    delays_declared = ("delay",)
     gain_setting: ClassVar[str] = "delay"
 
     per_drone = ("max_acceleration", "max_yaw_acceleration")

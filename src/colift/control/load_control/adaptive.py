@@ -78,7 +78,6 @@ class Adaptive(LoadControlPart, Delays):
 
     kernel = _adaptive
     remembers = MEMORY
-    delays_declared = ("delay",)
 
     learning: Annotated[float, Field(gt=0.0, le=2.0)] = 0.3
     """Rate at which the mass is learned over the bandwidth of the drones' position loops."""

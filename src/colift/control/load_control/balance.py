@@ -31,13 +31,14 @@ def _balance(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     for k in range(3):
         memory[push + k] += share * (forces[last, k] - memory[push + k])
         u_L[k] = m * (reference[2, k] + (g if k == 2 else 0.0)) - memory[push + k]
-        writes.steady_force[k] = u_L[k]
     # Keep the cables taut and the formation upright: a force up, within a cone.
     u_L[2] = max(u_L[2], 0.3 * m * g)
     across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
     if across > params[P.tangent] * u_L[2]:
         u_L[0] *= params[P.tangent] * u_L[2] / across
         u_L[1] *= params[P.tangent] * u_L[2] / across
+    for k in range(3):
+        writes.steady_force[k] = u_L[k]
 
 
 class Balance(LoadControlPart, Delays):
@@ -49,7 +50,6 @@ class Balance(LoadControlPart, Delays):
 
     kernel = _balance
     remembers = MEMORY
-    delays_declared = ("delay",)
 
     rate: Annotated[float, Field(gt=0.0, le=5.0)] = 0.45
     """How fast the observed force is followed, over the bandwidth of the velocity loop."""

@@ -181,7 +181,6 @@ class Momentum(ObservationPart, Delays):
 
     kernel = _observe
     remembers = MEMORY
-    delays_declared = ("delay",)
 
     paced_by = "position_control"
     per_drone = ("rotor_drag",)

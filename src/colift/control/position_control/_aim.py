@@ -67,6 +67,17 @@ def aim_along(i, fresh, dt, keep, planned, u, norm, memory, o, thrusts, attitude
 
 
 @inline
+def limit(i, u, least, most, tangent):  # type: ignore[no-untyped-def]
+    """Clip a wanted thrust vector to what the drone can give; height goes before place."""
+    u[i, 2] = min(max(u[i, 2], least), most)
+    across = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1])
+    room = min(tangent * u[i, 2], math.sqrt(max(most * most - u[i, 2] * u[i, 2], 0.0)))
+    if across > room:
+        u[i, 0] *= room / across
+        u[i, 1] *= room / across
+
+
+@inline
 def _unit(x, y, z):  # type: ignore[no-untyped-def]
     norm = math.sqrt(x * x + y * y + z * z)
     return (x / norm, y / norm, z / norm) if norm > NO_THRUST else (0.0, 0.0, 1.0)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from colift.control.position_control._aim import AIM, aim
+from colift.control.position_control._aim import AIM, aim, limit
 from colift.control.position_control._cable import CABLE, lead
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays
@@ -59,17 +59,6 @@ def _observe(i, v, params, memory, o):  # type: ignore[no-untyped-def]
         for k in range(3):
             memory[o + M.force + k] *= shrink
             memory[o + M.momentum + k] = m * v[i, k] - memory[o + M.force + k] / params[P.observer]
-
-
-@inline
-def _limit(i, u, least, most, tangent):  # type: ignore[no-untyped-def]
-    """Clip a wanted thrust vector to what the drone can give; height goes before place."""
-    u[i, 2] = min(max(u[i, 2], least), most)
-    across = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1])
-    room = min(tangent * u[i, 2], math.sqrt(max(most * most - u[i, 2] * u[i, 2], 0.0)))
-    if across > room:
-        u[i, 0] *= room / across
-        u[i, 1] *= room / across
 
 
 @inline
@@ -142,7 +131,7 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
             needed = ends[i, 2, k] - L * memory[o + M.direction + 6 + k] + (g if k == 2 else 0.0)
             u[i, k] = m * (needed + share * u[i, k]) - T[i] * a - (d + missing * a)
         least, most = m * g * params[P.min_thrust], m * g * params[P.max_thrust]
-        _limit(i, u, least, most, params[P.tangent])
+        limit(i, u, least, most, params[P.tangent])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         fresh = memory[o + M.started] == 0.0
         memory[o + M.started] = 1.0
@@ -178,7 +167,6 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     kernel = _observe_and_control
     remembers = MEMORY
-    delays_declared = ("delay",)
 
     observer: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     """Bandwidth of the observer over that of the position loop."""

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from colift.control.position_control._aim import AIM_ALONG, aim_along
+from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
 from colift.control.position_control._cable import CABLE, lead, swing
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays, pendulum_gains
@@ -45,17 +45,6 @@ FULL = 0.95
 """Share of a drone's largest thrust that it is asked for."""
 UNKNOWN = 2.5
 """Most thrust where nobody knows it, over the weight of a drone and its share of the load."""
-
-
-@inline
-def _limit(i, u, least, most, tangent):  # type: ignore[no-untyped-def]
-    """Clip a wanted thrust vector to what the drone can give; height goes before place."""
-    u[i, 2] = min(max(u[i, 2], least), most)
-    across = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1])
-    room = min(tangent * u[i, 2], math.sqrt(max(most * most - u[i, 2] * u[i, 2], 0.0)))
-    if across > room:
-        u[i, 0] *= room / across
-        u[i, 1] *= room / across
 
 
 @inline
@@ -141,7 +130,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         past = (wind[0] - v[i, 0], wind[1] - v[i, 1], wind[2] - v[i, 2])
         ux, uy, uz = rotors.thrust_for(u[i, 0], u[i, 1], u[i, 2], params[p + P.drag], past)
         u[i, 0], u[i, 1], u[i, 2] = ux, uy, uz
-        _limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
+        limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         fresh = memory[o + M.started] == 0.0
         memory[o + M.started] = 1.0
@@ -160,7 +149,6 @@ class Formation(PositionControlPart, Delays):
 
     kernel = _hold_formation
     remembers = MEMORY
-    delays_declared = ("delay",)
 
     per_drone = ("max_thrust", "rotor_drag")
     from_team: ClassVar[Mapping[str, float | None]] = {"max_thrust": None, "rotor_drag": 0.0}
