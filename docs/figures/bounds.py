@@ -10,7 +10,12 @@ import colift
 
 SEEDS = range(1000, 1040)
 CASES = {
-    "push": ("real-world", "position_control.max_push", 100.0, {"truth.load_mass_factor": 0.5}),
+    "push": (
+        "real-world-adaptive",
+        "position_control.max_push",
+        100.0,
+        {"truth.load_mass_factor": 0.5},
+    ),
     "turn": ("cut-in-flight", "allocation.max_rate", 6.0, {}),
 }
 """Mission, the bound, a value that bounds nothing, and other changes."""

@@ -60,7 +60,7 @@ def fly(overrides: Overrides, seeds: Iterable[int]) -> str:
     """Largest distance from the path and smallest angle over the seeds, and how many went to the end."""
     metrics, flown = [], 0
     for seed in seeds:
-        run = colift.run("real-world", seed=seed, overrides=overrides)
+        run = colift.run("real-world-adaptive", seed=seed, overrides=overrides)
         flown += 1
         if run.recording.outcome == "completed" and run.metrics["tracking_max_m"] < 1.0:
             metrics.append(run.metrics)
@@ -79,7 +79,7 @@ def lose(kind: str, overrides: Overrides) -> str:
         for drone in range(4):
             fault = [{"kind": kind, "at": at, "drone": drone}]
             run = colift.run(
-                "real-world", seed=1000 + flown, overrides={**overrides, "fault": fault}
+                "real-world-adaptive", seed=1000 + flown, overrides={**overrides, "fault": fault}
             )
             flown += 1
             r = run.recording

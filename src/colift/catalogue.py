@@ -49,21 +49,48 @@ LAYERS = tuple(folder for folder in FOLDERS if folder not in LISTS)
 
 DEFAULT_KINDS = {
     "sensing": "ideal",
-    "estimation": "none",
+    "estimation": "predictor",
     "supervision": "none",
-    "load_control": "pid",
+    "load_control": "balance",
     "allocation": "safe",
     "link": "ideal",
     "network": "perfect",
     "agents": "central",
-    "observation": "none",
-    "position_control": "pid",
-    "attitude_control": "manifold",
-    "actuation": "ideal",
+    "observation": "momentum",
+    "position_control": "formation",
+    "attitude_control": "delay-aware",
+    "actuation": "motors",
     "detection": "none",
     "plant": "slack-cables",
 }
-"""Parts of the layers that a mission need not name."""
+"""Parts of the layers that a mission need not name; but see :func:`default_kind`."""
+
+FORMATION = {layer: DEFAULT_KINDS[layer] for layer in ("load_control", "position_control")}
+"""The cascade in which the load hangs on the formation that the drones hold: these two go together."""
+
+TRACKING = {
+    "load_control": "pid", "observation": "none", "position_control": "pid", "attitude_control": "manifold",
+    "actuation": "ideal",
+}  # fmt: skip
+"""The paper's cascade, in which the load's own controller brings it to its place, and the motors that it takes for granted."""
+
+
+def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
+    """The part of a layer that a mission with these sections does not name; None for a layer that must be named.
+
+    Who asks for a load or position control of the paper's cascade gets the rest of it, too; nothing is predicted where
+    the sensors are ideal.
+    """
+
+    def kind(of: str) -> Any:
+        section = sections.get(of)
+        return section.get("kind") if isinstance(section, Mapping) else None
+
+    if layer == "estimation" and kind("sensing") in (None, DEFAULT_KINDS["sensing"]):
+        return "none"
+    if layer in TRACKING and any(kind(of) not in (None, own) for of, own in FORMATION.items()):
+        return TRACKING[layer]
+    return DEFAULT_KINDS.get(layer)
 
 
 VEHICLE = "vehicle"

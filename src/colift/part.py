@@ -126,6 +126,8 @@ class Part(BaseModel, metaclass=Refusing):
     """Settings that are the mission's ``timing.delay``, where it has one and does not give them themselves."""
     from_team: ClassVar[Mapping[str, float | None]] = {}
     """Settings that are the team's where they are None (:meth:`left_open`), and what they are where it does not know."""
+    of_all: ClassVar[tuple[str, ...]] = ()
+    """Of these, the ones that follow from all drones together, and so are others once one has left or joined."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
@@ -140,13 +142,19 @@ class Part(BaseModel, metaclass=Refusing):
         return {} if delay is None else dict.fromkeys(cls.delays_declared, delay)
 
     def of(self, drones: Sequence[int]) -> Self:
-        """Settings for the team of these drones: of values per drone, theirs."""
-        lists = {
+        """Settings for the team of these drones: of values per drone, theirs; what was left to the team is left to this one."""
+        changed: dict[str, Any] = {
             name: [value[drone] for drone in drones]
             for name in self.per_drone
             if isinstance(value := getattr(self, name), list)
         }
-        return self.model_copy(update=lists) if lists else self
+        left = {*self.of_all} - self.model_fields_set
+        changed |= {name: None for name in left if getattr(self, name) is not None}
+        if not changed:
+            return self
+        copy = self.model_copy(update=changed)
+        copy.model_fields_set.difference_update(left)
+        return copy
 
     def left_open(self, team: Team) -> dict[str, Vector]:
         """Of the settings in :attr:`from_team` what they are by the team's numbers (n,); not finite where unknown."""

@@ -317,19 +317,19 @@ IDEAL_ROTORS = {
 def test_the_real_world_is_coped_with_on_ideal_rotors(seed, factor):
     """10 m/s of wind with gusts, 20 ms of delay at 100 Hz, noise and half the load unknown."""
     changes = {**IDEAL_ROTORS, "truth.load_mass_factor": factor}
-    run = colift.run("real-world", seed=seed, overrides=changes)
+    run = colift.run("real-world-adaptive", seed=seed, overrides=changes)
     assert run.verdict.ok, run.verdict.reasons
     assert {each.metric for each in run.verdict.judged if each.asked} == set(run.mission.criteria)
 
 
 @pytest.mark.xfail(
-    reason="on motors in the storm the load strays by up to 0.7 m: see docs/stress.md"
+    reason="on motors in the storm the load strays by up to 0.7 m: see docs/theory/control.md"
 )
 @pytest.mark.parametrize("factor", [0.5, 1.5])
 def test_on_real_motors_it_is_flown_but_not_always_within_its_criteria(factor):
-    """docs/stress.md says how often; nobody is lost, and cables keep their angle."""
+    """docs/theory/control.md says how often; nobody is lost, and cables keep their angle."""
     for seed in range(1000, 1004):
-        run = colift.run("real-world", seed=seed, truth__load_mass_factor=factor)
+        run = colift.run("real-world-adaptive", seed=seed, truth__load_mass_factor=factor)
         assert run.mission.kinds["actuation"] == "motors"
         assert run.verdict.level != "lost"
         assert run.metrics["tracking_max_m"] < 0.25
@@ -340,7 +340,9 @@ def test_on_real_motors_it_is_flown_but_not_always_within_its_criteria(factor):
 @pytest.mark.parametrize("kind", ["cable-cut", "drone-lost"])
 def test_a_drone_lost_on_top_of_it_is_survived(kind):
     fault = [{"kind": kind, "at": 6.5, "drone": 1}]
-    flight = Flight(load_mission("real-world", {**IDEAL_ROTORS, "fault": fault, "seed": 3}))
+    flight = Flight(
+        load_mission("real-world-adaptive", {**IDEAL_ROTORS, "fault": fault, "seed": 3})
+    )
     r = flight.run()
     assert r.outcome == "completed"
     assert [drone for _, drone in flight.membership.found] == [1]
@@ -351,7 +353,7 @@ def test_a_drone_lost_on_top_of_it_is_survived(kind):
 def test_a_drone_whose_sensors_stand_still_is_let_go_before_it_does_harm():
     fault = [{"kind": "sensor-stuck", "at": 6.0, "drone": 2, "duration": 1e3}]
     changes = {**IDEAL_ROTORS, "fault": fault, "truth.load_mass_factor": 1.0}
-    flight = Flight(load_mission("real-world", changes))
+    flight = Flight(load_mission("real-world-adaptive", changes))
     r = flight.run()
     assert r.outcome == "completed"
     ((when, drone),) = flight.membership.found

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import colift
 from colift.catalogue import vehicle_names
 from colift.control.load_control.balance import Balance
 from colift.control.observation.momentum import Momentum
@@ -42,6 +43,7 @@ def fly(n=4, duration=15.0, reference="hover", push=(0.0, 0.0, 0.0), **sections)
         "drones": {"count": n},
         "reference": {"kind": reference},
         "timing": {"duration": duration, **PERIODS},
+        "actuation": {"kind": "ideal"},
         **CONTROLLERS,
     }
     if n <= 2:
@@ -193,3 +195,16 @@ def test_what_the_mission_has_is_what_controllers_are_told():
     assert told.observation.delay == 0.01
     # The resolved mission says it all, and flies the same.
     assert load_mission(mission.resolved()).resolved() == mission.resolved()
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.5])
+def test_the_real_world_is_flown_on_motors(factor):
+    """10 m/s of wind with gusts, 20 ms of delay at 100 Hz, noise, rotors that drag, and half the load unknown."""
+    for seed in range(3000, 3003):
+        run = colift.run("real-world", seed=seed, truth__load_mass_factor=factor)
+        assert run.mission.kinds["position_control"] == "formation"
+        assert run.mission.kinds["actuation"] == "motors"
+        assert run.verdict.ok, run.verdict.reasons
+        assert {each.metric for each in run.verdict.judged if each.asked} == set(
+            run.mission.criteria
+        )

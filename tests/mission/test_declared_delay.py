@@ -10,8 +10,8 @@ from colift.mission import load_mission
 from colift.part import LAYERS, find, names
 
 TRUE = {f"sensing.{sensor}_delay" for sensor in ("load", "tracking", "attitude", "rates")}
-TOLD = {f"{layer}.delay" for layer in ("estimation", "load_control", "position_control", "attitude_control")}  # fmt: skip
-NINE = {*TRUE, *TOLD, "estimation.attitude_delay"}
+TOLD = {f"{layer}.delay" for layer in ("estimation", "load_control", "observation", "position_control", "attitude_control")}  # fmt: skip
+ALL = {*TRUE, *TOLD, "estimation.attitude_delay"}
 
 
 def delays(mission):
@@ -25,9 +25,9 @@ def delays(mission):
 
 
 def test_it_is_the_default_of_all_settings():
-    assert {*delays(load_mission("real-world"))} == NINE
+    assert {*delays(load_mission("real-world"))} == ALL
     found = delays(load_mission("real-world", {"timing.delay": 0.035}))
-    assert found == dict.fromkeys(NINE, 0.035)
+    assert found == dict.fromkeys(ALL, 0.035)
 
 
 def test_without_one_each_setting_has_its_own_default():
@@ -36,13 +36,13 @@ def test_without_one_each_setting_has_its_own_default():
     assert found.sensing == find("sensing", "noisy")()
 
 
-@pytest.mark.parametrize("path", sorted(NINE))
+@pytest.mark.parametrize("path", sorted(ALL))
 def test_a_setting_of_its_own_goes_before_it(path):
     """So the controllers may be told another delay than there is."""
     found = delays(load_mission("real-world", {path: 0.011}))
-    assert found == {**dict.fromkeys(NINE, 0.02), path: 0.011}
+    assert found == {**dict.fromkeys(ALL, 0.02), path: 0.011}
     found = delays(load_mission("real-world", {"timing.delay": 0.03, path: 0.02}))
-    assert found == {**dict.fromkeys(NINE, 0.03), path: 0.02}
+    assert found == {**dict.fromkeys(ALL, 0.03), path: 0.02}
 
 
 def test_a_resolved_mission_says_all_and_follows_another_delay():
@@ -50,7 +50,7 @@ def test_a_resolved_mission_says_all_and_follows_another_delay():
     assert resolved["attitude_control"]["delay"] == 0.02
     assert load_mission(resolved).resolved() == resolved
     found = delays(load_mission(resolved, {"timing.delay": 0.03}))
-    assert found == {**dict.fromkeys(NINE, 0.03), "estimation.delay": 0.011}
+    assert found == {**dict.fromkeys(ALL, 0.03), "estimation.delay": 0.011}
 
 
 def test_a_part_put_in_place_in_flight_takes_it_too():

@@ -66,11 +66,13 @@ def test_flies_two_seconds_without_failures(name):
     assert run.metrics["tracking_max_m"] < 0.1
 
 
-STRAYS = pytest.mark.xfail(reason="real-world misses its 10 cm on motors: see docs/stress.md")
+STRAYS = pytest.mark.xfail(
+    reason="real-world-adaptive misses its 10 cm on motors: see docs/theory/control.md"
+)
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[STRAYS] if n == "real-world" else []) for n in NAMES]
+    "name", [pytest.param(n, marks=[STRAYS] if n == "real-world-adaptive" else []) for n in NAMES]
 )
 def test_cables_go_slack_unless_the_paper_says_rods_and_the_verdict_is_good(name):
     run = colift.run(name)

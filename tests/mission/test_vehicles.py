@@ -21,8 +21,9 @@ from colift.record.recorded import RecordedMission
 from colift.team import Team, Vehicle
 from colift.team.vehicles import NUMBERS, complete, estimated_inertia
 from colift.world.actuation.ideal import Ideal
-from colift.world.actuation.motors import PARAMS, Motors
-from colift.world.disturbance.drag import Drag
+from colift.world.actuation.motors import PARAMS as MOTORS_PARAMS
+from colift.world.actuation.motors import Motors
+from colift.world.disturbance.drag import PARAMS, Drag
 
 NAMES = catalogue.own_vehicle_names()
 REAL = [name for name in NAMES if name != "paper"]
@@ -127,16 +128,46 @@ def test_the_papers_drone_is_the_default():
     )  # fmt: skip
 
 
-def test_what_is_not_told_flies_as_before():
+def test_what_is_not_told_is_usual_and_shown_as_derived():
     plain = mission()
     assert plain.drones.vehicle is None
     assert set(plain.resolved()["drones"]) == {"count", "mass", "inertia", "cable_length"}
     motors, safe = plain.actuation, plain.allocation
     assert (motors.max_thrust, motors.time_constant, motors.arm_length) == (3.0, 0.02, 0.2)
     assert (motors.torque_ratio, motors.max_rate, motors.noise) == (0.016, 100.0, 0.01)
-    assert (safe.tension_min, safe.tension_max, safe.max_thrust) == (0.05, 5.0, None)
-    assert plain.resolved()["actuation"]["max_thrust"] == 3.0
-    assert notes_of(plain) == []
+    share = 0.1 * GRAVITY / 4
+    limits = (0.5 * share, 0.95 * 12.0 - 0.5 * GRAVITY, 11.4)
+    assert (safe.tension_min, safe.tension_max, safe.max_thrust) == pytest.approx(limits)
+    assert (safe.mu, safe.mu_scaling) == (pytest.approx(0.5 * share**2 * 4), "weight")
+    resolved = plain.resolved()
+    assert resolved["actuation"] == {
+        "kind": "motors", "min_thrust": 0.0, "centre_offset": [0.0, 0.0],
+    }  # fmt: skip
+    assert resolved["derived"]["actuation.max_thrust"] == 3.0
+    assert resolved["derived"]["drones.max_thrust"] == 12.0
+    assert resolved["derived"]["allocation.tension_min"] == pytest.approx(0.5 * share)
+    again = load_mission(resolved)
+    assert again.resolved() == resolved
+    heavier = load_mission(resolved, {"drones.mass": 1.0}).resolved()["derived"]
+    assert heavier["drones.max_thrust"] == 24.0
+    assert heavier["drones.arm"] == pytest.approx(0.2 * 2.0 ** (1.0 / 3.0))
+    (note,) = notes_of(plain)
+    assert note.path == "drones.max_thrust"
+    assert "12 N are assumed" in note.message
+    assert notes_of(mission({"max_thrust": 12.0})) == []
+
+
+def test_numbers_that_the_motors_say_are_the_drones_too():
+    given = {"max_thrust": 2.5, "time_constant": 0.03, "arm_length": 0.15}
+    found = mission(actuation={"kind": "motors", **given})
+    assert np.all(found.team.max_thrusts == 10.0)
+    assert np.all(found.team.motor_lags == 0.03)
+    assert found.allocation.max_thrust == pytest.approx(9.5)
+    assert found.attitude_control.lag == 0.03
+    assert notes_of(found) == []
+    ideal = mission(actuation={"kind": "ideal"})
+    assert np.isinf(ideal.team.max_thrusts).all()
+    assert (ideal.allocation.mu, ideal.allocation.mu_scaling) == (0.15, "absolute")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -152,9 +183,9 @@ def test_a_vehicle_feeds_motors_allocator_and_drag(name):
     assert motors.torque_ratio == vehicle.torque_ratio
     assert motors.max_rate * 0.03 == pytest.approx(motors.max_thrust)
     assert motors.noise * 300.0 == pytest.approx(motors.max_thrust)
-    assert safe.max_thrust == pytest.approx(0.9 * vehicle.max_thrust)
-    assert safe.tension_max == pytest.approx(0.85 * vehicle.max_thrust - vehicle.mass * GRAVITY)
-    assert safe.tension_min == pytest.approx(0.1 * load * GRAVITY / 4)
+    assert safe.max_thrust == pytest.approx(0.95 * vehicle.max_thrust)
+    assert safe.tension_max == pytest.approx(0.95 * vehicle.max_thrust - vehicle.mass * GRAVITY)
+    assert safe.tension_min == pytest.approx(0.5 * load * GRAVITY / 4)
     assert found.disturbance[0].rotor_drag == (vehicle.rotor_drag or 0.0)
     # The motors' largest torque with the thrust of hover is what the vehicle's rotors have about their weaker axis.
     n = vehicle.rotors
@@ -168,7 +199,7 @@ def test_a_vehicle_feeds_motors_allocator_and_drag(name):
             float(np.sum(spare * y / np.abs(y).max() * y))
         )  # thrusts in proportion to their lever
     params = motors.params(team)
-    lever = params[PARAMS.at.rows + PARAMS.at.lever]
+    lever = params[MOTORS_PARAMS.at.rows + MOTORS_PARAMS.at.lever]
     assert 4.0 * lever * spare * n / 4.0 == pytest.approx(min(reach), rel=1e-3)
 
 
@@ -234,7 +265,7 @@ def test_unequal_drones():
     assert (one.n, one.max_thrusts[0], one.arms[0]) == (1, heavy.max_thrust, heavy.arm)
     each = mission({"vehicle": "x500", "count": 2, "max_thrust": [34.0, 40.0]})
     np.testing.assert_array_equal(each.team.max_thrusts, [34.0, 40.0])
-    np.testing.assert_allclose(each.allocation.max_thrust, [30.6, 36.0])
+    np.testing.assert_allclose(each.allocation.max_thrust, [32.3, 38.0])
 
 
 def test_radius_follows_from_arm_and_rotor():
@@ -256,8 +287,11 @@ def test_an_estimated_inertia_is_said_and_kept():
     known = load_mission(found.resolved(), {"drones.inertia": [0.04, 0.04, 0.07]})
     assert notes_of(known) == []
     assert notes_of(mission({"vehicle": "x500"})) == []
-    (note,) = notes_of(mission({"mass": 0.6}))
-    assert "that of the paper's drone" in note.message
+    inertia, thrust = sorted(notes_of(mission({"mass": 0.6})), key=lambda note: note.path)
+    assert (inertia.path, thrust.path) == ("drones.inertia", "drones.max_thrust")
+    assert "estimated from mass and arm" in inertia.message
+    (thrust, inertia) = notes_of(mission({"mass": 0.5}))
+    assert "that of the paper's drone" in inertia.message
 
 
 def test_another_vehicle_drops_what_the_old_one_brought():
@@ -385,9 +419,9 @@ def test_what_binds_is_named_where_it_comes_from():
 
 
 def test_limits_of_the_tension_may_not_cross():
-    (found,) = problems({"vehicle": "x500"}, **{"allocation.tension_min": 9.0})
+    (found,) = problems({"vehicle": "x500"}, **{"allocation.tension_min": 12.0})
     assert found.path == "allocation.tension_min"
-    assert "conflicts with tension_max = 8.82" in found.message
+    assert "conflicts with tension_max = 12.2" in found.message
 
 
 def test_teams_of_vehicles_in_python():
@@ -411,10 +445,22 @@ def test_teams_of_vehicles_in_python():
 
 def test_drag_takes_the_rotors_of_each_drone():
     team = Team.of_vehicles(["x500", "crazyflie-2.1"], load_mass=0.1)
-    params = Drag().params(team)
-    np.testing.assert_array_equal(params[-2:], team.rotor_drags)
-    np.testing.assert_array_equal(Drag(rotor_drag=[0.1, 0.2]).params(team)[-2:], [0.1, 0.2])
-    assert np.all(Drag().params(Team.uniform(2))[-2:] == 0.0)
+
+    def rotors(part, of):
+        return part.params(of)[PARAMS.at.rows + PARAMS.at.rotor_drag :: PARAMS.at.width]
+
+    np.testing.assert_array_equal(rotors(Drag(), team), team.rotor_drags)
+    np.testing.assert_array_equal(rotors(Drag(rotor_drag=[0.1, 0.2]), team), [0.1, 0.2])
+    assert np.all(rotors(Drag(), Team.uniform(2)) == 0.0)
+
+
+def test_larger_bodies_have_more_drag():
+    small, large = Drag().filled(Team.uniform(2)), Drag().filled(Team.uniform(2, mass=4.0))
+    assert (small.drone_area, small.load_area, small.cable_diameter) == (0.012, 0.006, 0.0015)
+    assert large.drone_area == pytest.approx(4.0 * small.drone_area)
+    heavy = Drag().filled(Team.uniform(2, load_mass=8 * 0.225))
+    assert heavy.load_area == pytest.approx(4.0 * small.load_area)
+    assert heavy.cable_diameter == pytest.approx(math.sqrt(8.0) * small.cable_diameter)
 
 
 def test_the_mission_that_the_page_begins_with():

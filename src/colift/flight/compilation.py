@@ -133,7 +133,7 @@ def _parts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             sections.append((layer, {"kind": value} if leaf == "kind" else value))
     for layer, section in sections:
         if layer in catalogue.FOLDERS and isinstance(section, Mapping):
-            kind = section.get("kind", catalogue.DEFAULT_KINDS.get(layer))
+            kind = section.get("kind", catalogue.default_kind(layer, table))
             if isinstance(kind, str):
                 yield layer, kind
 

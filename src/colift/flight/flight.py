@@ -249,7 +249,7 @@ class Flight:
         directions[~new] = old.bus.directions[stay]
         for i in np.flatnonzero(new):
             taken = directions[np.linalg.norm(directions, axis=1) > 0.0]
-            directions[i] = widest_gap(taken, np.radians(self.mission.start.cone_deg))
+            directions[i] = widest_gap(taken, self.mission.start_cone)
         start = Start(
             load_position=old.bus.load[0],
             load_velocity=old.bus.load[1],

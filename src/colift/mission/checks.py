@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,7 @@ from colift.errors import Problem, UnknownNameError
 from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
 from colift.mission.criteria import METRICS
+from colift.mission.forecast import forecast
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
 from colift.wording import parse, problems_of, shown
@@ -141,12 +143,14 @@ def _start_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
         message = part.of(drones).cannot_start(frame.team.of(drones), frame.start_directions())
         if message:
             field = "cone_deg" if given is None else "directions"
-            value = f"{frame.start.cone_deg:g}" if given is None else ""
+            value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
             yield Problem(f"start.{field}", value, message)
 
 
-def hover_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
-    """Why the team cannot hold the load in hover, in the formation that its allocator settles in.
+def hover_checks(
+    frame: Frame, parts: Mapping[str, Part], disturbances: Sequence[Part]
+) -> Iterable[Problem]:
+    """Why the team cannot hold the load in hover, in the formation that its allocator settles in, or in the wind.
 
     Judged by what the controllers are told. Asked only of a valid mission: it calls the allocator, where
     it has limits that may not do or where motors limit the thrust.
@@ -162,7 +166,19 @@ def hover_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
     if team.gravity == 0.0 or (unlimited and not allocation.cannot_hold(team, thrusts, directions)):
         return
     hover = allocation.hover(team, directions, frame.timing.allocation)
-    for layer, message in hover_conflicts(team, hover, thrusts).items():
+    conflicts = hover_conflicts(team, hover, thrusts)
+    if "allocation" in conflicts:
+        steep = allocation.with_any_thrust(team).hover(team, directions, frame.timing.allocation)
+        weak = hover_conflicts(team, steep, thrusts)
+        conflicts = weak if "actuation" in weak else conflicts
+    if not conflicts:
+        bound = frame.criteria.get("tracking_max_m")
+        allowed = math.inf if bound is None or bound.max is None else bound.max
+        those = [part.of(drones) for part in disturbances]
+        ahead = forecast(team, hover, thrusts, those, parts["attitude_control"].of(drones))
+        for layer, message in ahead.problems(team, allowed):
+            yield Problem(layer, "", message)
+    for layer, message in conflicts.items():
         if layer == "actuation":
             path, field = actuation.thrust_path(team), actuation.thrust_setting
             value = _of_drones(frame, path) or shown(getattr(actuation, field))

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from colift.catalogue import DEFAULT_KINDS, FOLDERS, LAYERS, LISTS, read_source
+from colift.catalogue import FOLDERS, LAYERS, LISTS, default_kind, read_source
 from colift.errors import MissionError, Problem, SettingError, UnknownNameError
 from colift.mission.checks import cross_checks, hover_checks
 from colift.mission.mission import Mission
@@ -21,6 +21,7 @@ from colift.mission.schema import Frame
 from colift.part import KIND, Declaration, Declared, Part, find, names
 from colift.team.vehicles import NUMBERS
 from colift.wording import parse, problems_of, shown
+from colift.world.actuation.base import ActuationPart
 
 
 def load_mission(
@@ -121,7 +122,7 @@ def _override(table: dict[str, Any], path: str, value: Any, given: set[str]) -> 
             path, "", f"{'.'.join(parents)} is a list of {len(node)}; name one by its number"
         )
     section = path.removesuffix(leaf)
-    before = node.get("kind", DEFAULT_KINDS.get(parents[-1] if parents else ""))
+    before = node.get("kind", default_kind(parents[-1] if parents else "", table))
     if leaf == "kind" and before not in (None, value):
         own = {
             known[len(section) :].partition(".")[0] for known in given if known.startswith(section)
@@ -148,7 +149,7 @@ def _follow_delay(table: dict[str, Any], before: Any, given: set[str]) -> None:
         if before is None or not isinstance(section, dict) or layer in given:
             continue
         try:
-            part = find(layer, str(section.get("kind", DEFAULT_KINDS.get(layer))))
+            part = find(layer, str(section.get("kind", default_kind(layer, table))))
         except UnknownNameError:
             continue
         for name in part.delays_declared:
@@ -187,7 +188,7 @@ def _drop_old_vehicle(table: dict[str, Any], path: str, value: Any, given: set[s
             for i, section in enumerate(sections if isinstance(sections, list) else [sections]):
                 if not isinstance(section, dict):
                     continue
-                kind = section.get("kind", DEFAULT_KINDS.get(layer))
+                kind = section.get("kind", default_kind(layer, table))
                 if isinstance(kind, str) and kind in names(layer):
                     where = f"{layer}.{i}" if layer in LISTS else layer
                     old.append((where, section, tuple(find(layer, kind).from_team)))
@@ -220,16 +221,20 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
     """Validate section by section, so that a mistake in one does not hide those in others."""
     parts: dict[str, Part] = {}
     kinds: dict[str, str] = {}
-    rest = {name: section for name, section in table.items() if name not in (*LAYERS, *LISTS)}
+    apart = (*LAYERS, *LISTS, "derived")  # what was derived is derived anew
+    rest = {name: section for name, section in table.items() if name not in apart}
     frame, mistakes = _frame(rest)
     told = Declaration(frame.timing)
     for layer in sorted(LAYERS, key=lambda layer: layer not in ("sensing", "actuation")):
-        found = _part(layer, table.get(layer, {}), layer, told, problems)
+        kind = default_kind(layer, table)
+        found = _part(layer, table.get(layer, {}), layer, kind, told, problems)
         if found is not None:
             kinds[layer], parts[layer] = found
             if layer in ("sensing", "actuation"):
                 known: dict[str, Any] = {layer: parts[layer]}
                 if not frame.drones.problems():
+                    if layer == "actuation":
+                        frame = _with_motors(frame, parts[layer])
                     known[layer] = parts[layer].filled(frame.team)
                 told = replace(told, **known)
     kinds = {layer: kinds[layer] for layer in LAYERS if layer in kinds}
@@ -242,7 +247,7 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
             problems.append(Problem(name, shown(sections), f"must be a list of tables, [[{name}]]"))
             sections = []
         each = [
-            _part(name, section, f"{name}.{i}", told, problems)
+            _part(name, section, f"{name}.{i}", None, told, problems)
             for i, section in enumerate(sections)
         ]
         list_kinds[name] = [item[0] for item in each if item]
@@ -251,7 +256,7 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
     broken = {problem.path.partition(".")[0] for problem in mistakes}
     problems.extend(cross_checks(frame, parts, lists, broken, must_fly=must_fly))
     if must_fly and not problems:
-        problems.extend(hover_checks(frame, parts))
+        problems.extend(hover_checks(frame, parts, lists["disturbance"]))
     if problems:
         return None
     team = frame.team
@@ -273,15 +278,30 @@ def _frame(table: dict[str, Any]) -> tuple[Frame, list[Problem]]:
         return parse(Frame, {"name": "?", **intact}), mistakes
 
 
+def _with_motors(frame: Frame, rotors: Part) -> Frame:
+    """The frame whose drones have what their motors have, where they do not say it themselves."""
+    assert isinstance(rotors, ActuationPart)
+    team = frame.team
+    if rotors.wrong_lengths(team.n):
+        return frame
+    drones = frame.drones.assuming(rotors.assumed(team), rotors.guessed(team))
+    return frame.model_copy(update={"drones": drones})
+
+
 def _part(
-    layer: str, section: Any, path: str, told: Declared, problems: list[Problem]
+    layer: str,
+    section: Any,
+    path: str,
+    default: str | None,
+    told: Declared,
+    problems: list[Problem],
 ) -> tuple[str, Part] | None:
-    """Name and settings of the part that a section asks for; None, and problems, where it cannot."""
+    """Name and settings of the part that a section asks for, or of the default; None, and problems, where it cannot."""
     if not isinstance(section, dict):
         problems.append(Problem(path, shown(section), "must be a table"))
         return None
     settings = dict(section)
-    kind = settings.pop("kind", DEFAULT_KINDS.get(layer))
+    kind = settings.pop("kind", default)
     if kind is None:
         valid = ", ".join(names(layer))
         problems.append(Problem(f"{path}.kind", "", f"is required: one of {valid}"))

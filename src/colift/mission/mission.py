@@ -19,7 +19,6 @@ from colift.control.reference.base import ReferencePart
 from colift.control.supervision.base import SupervisionPart
 from colift.mission.schema import Described
 from colift.part import LISTS, Part
-from colift.team import Team
 from colift.world.actuation.base import ActuationPart
 from colift.world.disturbance.base import DisturbancePart
 from colift.world.fault.base import FaultPart
@@ -63,26 +62,28 @@ class Mission(Described):
     def resolved(self) -> dict[str, Any]:
         """The whole mission with every default filled in, as plain data (a valid mission file).
 
-        What the drones' numbers say stands with the drones, not again in the parts that take it from there.
+        What follows from the team stands under ``derived``, by its path.
         """
         data = self.model_dump(mode="json", exclude={"kinds", "list_kinds"}, exclude_none=True)
-        team = self.team
+        team, derived = self.team, {}
+
+        def described(path: str, kind: str, settings: dict[str, Any], part: Part) -> dict[str, Any]:
+            for name in part.by_team(team):
+                if name in settings:
+                    derived[f"{path}.{name}"] = settings.pop(name)
+            return {"kind": kind, **settings}
+
+        for name in self.drones.assumed:
+            derived[f"drones.{name}"] = data["drones"].pop(name)
         for layer, kind in self.kinds.items():
-            data[layer] = _described(kind, data[layer], getattr(self, layer), team)
+            data[layer] = described(layer, kind, data[layer], getattr(self, layer))
         for name in LISTS:
+            several = zip(self.list_kinds[name], data[name], getattr(self, name), strict=True)
             data[name] = [
-                _described(kind, settings, part, team)
-                for kind, settings, part in zip(
-                    self.list_kinds[name], data[name], getattr(self, name), strict=True
-                )
+                described(f"{name}.{i}", kind, settings, part)
+                for i, (kind, settings, part) in enumerate(several)
             ]
+        data["derived"] = derived
         if any(name.endswith(".toml") for name in np.atleast_1d(self.drones.vehicle or "")):
             del data["drones"]["vehicle"]  # the numbers stand there; the file may be gone by then
         return data
-
-
-def _described(kind: str, settings: dict[str, Any], part: Part, team: Team) -> dict[str, Any]:
-    """A part as its section: its kind, and its settings without those that the team's numbers say."""
-    said = part.by_team(team)
-    kept = {name: value for name, value in settings.items() if name not in said}
-    return {"kind": kind, **kept}

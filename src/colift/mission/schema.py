@@ -13,6 +13,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    PrivateAttr,
     Tag,
     field_validator,
     model_validator,
@@ -21,7 +22,7 @@ from pydantic import (
 from colift.catalogue import LAYERS
 from colift.errors import ColiftError
 from colift.team import Team, vehicles
-from colift.team.geometry import Array, ring
+from colift.team.geometry import Array, ring, ring_cone
 
 Positive = Annotated[float, Field(gt=0.0)]
 Inertia = tuple[Positive, Positive, Positive]
@@ -111,8 +112,9 @@ class Load(Section):
 class Drones(Section):
     """The drones and their cables; one value for all, or a list with one value per drone.
 
-    A number that is left out is the vehicle's. Without a vehicle, mass and inertia are the paper's, and what else is
-    left out is not known: what depends on it has a default of its own.
+    A number that is left out is the vehicle's. Without a vehicle, mass and inertia are the paper's. Of what else is left
+    out, thrust, lag, arm and torque ratio are those of the motors (``actuation``), which are usual ones where it does not say
+    either; what depends on other numbers has a default of its own.
     """
 
     vehicle: NamePerDrone | None = None
@@ -147,6 +149,27 @@ class Drones(Section):
     """Ideal power of the rotors in hover over the battery's power."""
     inertia_from: Literal["given", "vehicle", "estimate", "paper"] | None = None
     """Where the inertia comes from; written by colift, for whoever reads the resolved mission."""
+    _assumed: tuple[str, ...] = PrivateAttr(default=())
+    _guessed: frozenset[str] = PrivateAttr(default=frozenset())
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Numbers that the mission does not give here, but that its motors have."""
+        return self._assumed
+
+    def assuming(self, numbers: Mapping[str, Any], guessed: Iterable[str]) -> Self:
+        """The same drones with numbers (n,) for fields that are not known, some of which are no more than ``guessed``."""
+        known = {
+            name: float(each[0]) if np.all(each == each[0]) else each.tolist()
+            for name, each in numbers.items()
+            if getattr(self, name) is None and np.isfinite(each).all()
+        }
+        if not known:
+            return self
+        copy = self.model_copy(update=known)
+        copy.model_fields_set.difference_update(known)
+        copy._assumed, copy._guessed = tuple(known), frozenset(known) & {*guessed}
+        return copy
 
     @field_validator("vehicle")
     @classmethod
@@ -217,25 +240,30 @@ class Drones(Section):
 
     def notes(self) -> list[tuple[str, str]]:
         """What was put in for what is left out and should be known better, as ``(field, message)``."""
+        found = []
+        if "max_thrust" in self._guessed:
+            most = np.atleast_1d(np.asarray(self.max_thrust))
+            message = (
+                f"is not given: {most.max():.4g} N are assumed, {vehicles.THRUST_PER_MASS:g} N for each kg, and with them the "
+                "limits of the motors and the allocator; give what the data sheet says, or a vehicle"
+            )
+            found.append(("max_thrust", message))
         if self.inertia_from == "estimate":
             for drone, body in enumerate(self.numbers()):
-                J = vehicles.estimated_inertia(body["mass"], body.get("arm", 0.0))
+                usual = vehicles.usual_arm(body["mass"], vehicles.PAPER_INERTIA)
+                J = vehicles.estimated_inertia(body["mass"], body.get("arm", usual))
                 if tuple(body["inertia"]) == J:
                     text = ", ".join(f"{moment:.3g}" for moment in J)
                     message = (
                         f"is estimated from mass and arm, as m a^2 (1/4, 1/4, 1/2): {text} kg m^2 for drone {drone}, "
                         "good to a factor of two; measure it, or take it from a model"
                     )
-                    return [("inertia", message)]
+                    found.append(("inertia", message))
+                    break
         if self.inertia_from == "paper" and "mass" in self.model_fields_set:
-            return [
-                (
-                    "inertia",
-                    f"is that of the paper's drone of {vehicles.PAPER_MASS:g} kg, but a mass is given: give the inertia "
-                    "too, or arm, from which it is estimated",
-                )
-            ]
-        return []
+            message = f"is that of the paper's drone of {vehicles.PAPER_MASS:g} kg: give yours, or arm, from which it is estimated"
+            found.append(("inertia", message))
+        return found
 
 
 class Truth(Section):
@@ -254,11 +282,18 @@ class Truth(Section):
     """Of ``drones.cable_length``."""
 
 
+PAPER_CONE, WIDEST_START = math.radians(35.0), math.radians(65.0)
+"""Half-angles of the ring of a start that says none: the paper's, and the most, rad."""
+APART = math.radians(33.0)
+"""Angle between neighbours of such a ring, rad: a little more than the allocator's least."""
+
+
 class Start(Section):
     """State of load and drones at t = 0, at rest."""
 
-    cone_deg: Annotated[float, Field(gt=0.0, lt=180.0)] = 35.0
-    """Half-angle of the ring that the drones start on, degrees (paper: 35, see the errata)."""
+    cone_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
+    """Half-angle of the ring that the drones start on, degrees. None: 35 (the paper's, see the errata); where that brings
+    neighbours nearer than 33 degrees, so much more, up to 65."""
     heading_deg: float = 0.0
     """Azimuth of the first drone, degrees."""
     directions: list[Point] | None = None
@@ -395,6 +430,9 @@ class Frame(Section):
     """Changes during the flight."""
     criteria: dict[str, Bound] = {}
     """What makes the flight a pass: bounds by the name of a metric."""
+    derived: dict[str, Any] = {}
+    """What follows from the team and the timing, by its path; written by colift for whoever reads the resolved mission. Changed
+    here it changes nothing: give a setting in its own section."""
 
     @property
     def team(self) -> Team:
@@ -427,12 +465,19 @@ class Frame(Section):
                 first.setdefault(event.value, event.of_team)
         return [i for i in range(self.drones.count) if first.get(i) != "join"]
 
+    @property
+    def start_cone(self) -> float:
+        """Half-angle of the ring that the drones start on, rad."""
+        if self.start.cone_deg is not None:
+            return math.radians(self.start.cone_deg)
+        return max(PAPER_CONE, min(ring_cone(len(self.first_drones()), APART), WIDEST_START))
+
     def start_directions(self) -> Array:
         """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""
         drones = self.first_drones()
         if self.start.directions is None:
-            cone, heading = math.radians(self.start.cone_deg), math.radians(self.start.heading_deg)
-            return ring(len(drones), cone, heading=heading)
+            heading = math.radians(self.start.heading_deg)
+            return ring(len(drones), self.start_cone, heading=heading)
         given = np.array(self.start.directions, dtype=float)[drones]
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
 

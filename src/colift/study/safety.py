@@ -212,12 +212,13 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
     """Send one seeded family of forces through one allocator and judge every answer."""
     team, limits = problem(n)[0], problem(n)[1]
     lowest, highest = limits.tension_floors(team), limits.tension_caps(team)
+    turn = limits.turn_rate(team) * PERIOD
     smallest, broken, unflagged, yields, avoidable, bad = 180.0, 0.0, 0, 0, 0, 0
     times = []
     reach = (
         lowest,
         highest,
-        limits.max_rate * PERIOD,
+        turn,
         math.radians(limits.max_cone_deg),
     )
     flagged = [int(s) for s in Status if not s.ok]
@@ -231,7 +232,7 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
             np.max(T) - float(np.max(highest)),
             float(np.min(lowest)) - np.min(T),
             np.max(np.arccos(np.clip(-alpha[..., 2], -1, 1))) - math.radians(limits.max_cone_deg),
-            np.max(turned) - limits.max_rate * PERIOD,
+            np.max(turned) - turn,
         )
         broken = max(broken, *(float(x) for x in over))
         told = np.isin(found.status, flagged)
@@ -361,9 +362,9 @@ def show_all(
 
     attacks, flights = [], []
     for n in sizes:
-        safe = problem(n)[1]
+        team, safe = problem(n)
         for family in FAMILIES:
-            for part in (safe, Sqp(mu=safe.mu)):
+            for part in (safe, Sqp(mu=safe.penalty(team))):
                 found = attack(n, family, cycles, part)
                 attacks.append({**asdict(found), "holds": found.holds})
             tick()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -20,6 +22,14 @@ def ring(n: int, cone: float, *, heading: float = 0.0) -> Array:
     return -np.column_stack(
         [np.sin(cone) * np.cos(azimuth), np.sin(cone) * np.sin(azimuth), np.full(n, np.cos(cone))]
     )
+
+
+def ring_cone(n: int, apart: float) -> float:
+    """Half-angle of a ring of n cables on which neighbours are ``apart`` (rad); a quarter turn where no ring has room."""
+    if n < 2:
+        return 0.0
+    reach = math.sin(0.5 * apart) / math.sin(math.pi / n)
+    return math.asin(reach) if reach < 1.0 else 0.5 * math.pi
 
 
 def rotation_between(a: Array, b: Array) -> Array:

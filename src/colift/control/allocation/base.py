@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,6 +90,10 @@ class AllocatorPart(Part):
     layer: ClassVar[str] = "allocation"
     spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
     """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
+
+    def with_any_thrust(self, team: Team) -> Self:
+        """The same limits but those that follow from the drones' thrust, and cables as steep as they allow: what needs the least."""
+        return self
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""

@@ -192,12 +192,16 @@ RATE_BARRIER = 1.0
 """Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
 GIVE_WAY = 20.0
 """Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
-LOW = 0.1
+LOW = 0.5
 """Least tension over a cable's share of the load's weight, where the drones' thrust is known and no limit is given."""
-MOST = 0.9
-"""Share of a drone's thrust that is planned with then: with the rest it turns and resists the wind."""
-HIGH = 0.85
-"""Share of it that holds the drone and its cable at the largest tension."""
+MOST = 0.95
+"""Share of a drone's thrust that is planned with then: what hover must leave it to be controlled with."""
+MU = 8.0
+"""Weight of the alignment penalty over W^2 / n^3, for a load of weight W on n cables: a cone in which they stand wide apart."""
+RATE, SWINGING = 0.15, 1.0
+"""Fastest turn of cables of 1 m, rad/s, which drones with real motors can follow; of one or two cables, on which a load swings."""
+ANY = 1e6
+"""Force that nothing limits, N."""
 RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
 
@@ -214,33 +218,40 @@ class Safe(AllocatorPart):
     kernel = _allocate
     spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
     per_drone = ("tension_min", "tension_max", "max_thrust", "weights")
+    of_all = ("tension_min", "tension_max", "mu", "mu_force", "max_rate")
     from_team: ClassVar[Mapping[str, float | None]] = {
         "tension_min": 0.05,
         "tension_max": 5.0,
         "max_thrust": None,
+        "mu": 0.15,
+        "mu_force": 2.20725,
+        "max_rate": 6.0,
     }
 
-    mu: Annotated[float, Field(ge=0.0)] = 0.15
-    """Weight of the alignment penalty, N^2."""
-    mu_scaling: Literal["absolute", "weight"] = "absolute"
+    mu: Annotated[float, Field(ge=0.0)] | None = None
+    """Weight of the alignment penalty, N^2. None: 8 W^2 / n^3 for a load of weight W on n cables where ``drones.max_thrust`` is
+    known, growing with the square of the force; else 0.15."""
+    mu_scaling: Literal["absolute", "weight"] | None = None
     """``weight``: mu grows with the square of the force, so that a heavier load does not draw the
-    cables together; ``mu`` is meant for ``mu_force``."""
-    mu_force: Force = 2.20725
-    """Force for which ``mu`` is meant when it is scaled, N (default: weight of the paper's load)."""
+    cables together; ``mu`` is meant for ``mu_force``. None: ``weight`` where mu is left to the team, else ``absolute``."""
+    mu_force: Force | None = None
+    """Force for which ``mu`` is meant when it is scaled, N. None: the load's weight where mu is left to the team, else that of
+    the paper's load."""
     min_angle_deg: Annotated[float, Field(gt=0.0, lt=150.0)] = 30.0
     """Least angle between any two cables, degrees."""
     tension_min: Force | list[Force] | None = None
-    """Least tension, N; one value, or one per cable. None: a tenth of a cable's share of the load's weight where
+    """Least tension, N; one value, or one per cable. None: half of a cable's share of the load's weight where
     ``drones.max_thrust`` is known, else 0.05."""
     tension_max: Force | list[Force] | None = None
-    """Largest tension, N; one value, or one per cable. None: what 0.85 of ``drones.max_thrust`` lifts beside the drone,
+    """Largest tension, N; one value, or one per cable. None: what 0.95 of ``drones.max_thrust`` lifts beside the drone,
     or 5."""
     max_cone_deg: Degrees = 75.0
     """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
-    max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 6.0
-    """Fastest turn of a cable's direction, rad/s."""
+    max_rate: Annotated[float, Field(gt=0.0, le=1e3)] | None = None
+    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 0.15 for a cable of 1 m and less as
+    the square root of its length, 1 for teams of one or two; else 6."""
     max_thrust: Force | list[Force] | None = None
-    """Largest thrust of a drone, N. None: 0.9 of ``drones.max_thrust``, or not limited."""
+    """Largest thrust of a drone, N. None: 0.95 of ``drones.max_thrust``, or not limited."""
     max_tilt_deg: Degrees | None = None
     """Largest angle between a drone's thrust and the vertical, degrees; none: not limited."""
     weights: Annotated[float, Field(gt=0.0)] | list[Annotated[float, Field(gt=0.0)]] = 1.0
@@ -290,12 +301,53 @@ class Safe(AllocatorPart):
     def left_open(self, team: Team) -> dict[str, Vector]:
         known = np.isfinite(team.max_thrusts)
         share = team.load_mass * max(team.gravity, 1e-3) / team.n
-        lifts = HIGH * team.max_thrusts - team.masses * team.gravity
+        lifts = MOST * team.max_thrusts - team.masses * team.gravity
+        weight = share * team.n
+        turn = RATE / math.sqrt(float(team.cable_lengths.mean())) if team.n > 2 else SWINGING
+        own = known.all() and self._left
         return {
+            "mu": np.full(team.n, MU * weight**2 / team.n**3 if own else math.nan),
+            "mu_force": np.full(team.n, weight if own else math.nan),
+            "max_rate": np.where(known.all(), np.full(team.n, turn), math.nan),
             "tension_min": np.where(known, LOW * share, math.nan),
             "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), math.nan),
             "max_thrust": MOST * team.max_thrusts,
         }
+
+    def filled(self, team: Team) -> Safe:
+        copy = super().filled(team)
+        if "mu_scaling" not in self.model_fields_set:
+            scaled: Literal["weight", "absolute"] = "weight" if self._scaled(team) else "absolute"
+            copy = copy.model_copy(update={"mu_scaling": scaled})
+            copy.model_fields_set.discard("mu_scaling")
+        return copy
+
+    def by_team(self, team: Team) -> list[str]:
+        scaling = [] if "mu_scaling" in self.model_fields_set else ["mu_scaling"]
+        return super().by_team(team) + scaling
+
+    @property
+    def _left(self) -> bool:
+        """Whether mu is left to the team."""
+        return self.mu is None or "mu" not in self.model_fields_set
+
+    def with_any_thrust(self, team: Team) -> Safe:
+        free = {"max_thrust", "tension_max"} & {*self.by_team(team)}
+        return self.model_copy(update={**dict.fromkeys(free, ANY), "mu": 0.0})
+
+    def turn_rate(self, team: Team) -> float:
+        """Fastest turn of a cable's direction, rad/s."""
+        return float(self.settled("max_rate", team)[0])
+
+    def penalty(self, team: Team) -> float:
+        """Weight of the alignment penalty, N^2."""
+        return float(self.settled("mu", team)[0])
+
+    def _scaled(self, team: Team) -> bool:
+        """Whether mu grows with the square of the force."""
+        if "mu_scaling" in self.model_fields_set and self.mu_scaling is not None:
+            return self.mu_scaling == "weight"
+        return self._left and bool(np.isfinite(team.max_thrusts).all())
 
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
         problems = []
@@ -309,10 +361,8 @@ class Safe(AllocatorPart):
                 "max_thrust",
                 f"max_thrust = {self.max_thrust} conflicts with drones.mass: {need}",
             )
-            if "max_thrust" in self.by_team(team):
-                least = f"must be at least {own[i] / (0.8 * MOST):.4g} N"
-                told = ("drones.max_thrust", f"{least}: {need}, with {MOST:g} of it planned with")
-            problems.append(told)
+            if "max_thrust" not in self.by_team(team):
+                problems.append(told)
         return problems + feasible.conflicts_of(team, self)
 
     def cannot_hold(self, team: Team, thrusts: Vector, directions: Vector) -> list[str]:
@@ -373,16 +423,16 @@ class Safe(AllocatorPart):
         cone, tilt = math.radians(self.max_cone_deg), math.radians(self.max_tilt_deg or 89.0)
         return cycle.PARAMS.pack(
             n,
-            mu=self.mu,
-            mu_scaled=self.mu_scaling == "weight",
-            mu_force=self.mu_force,
+            mu=self.penalty(team),
+            mu_scaled=self._scaled(team),
+            mu_force=float(self.settled("mu_force", team)[0]),
             sigma=max(team.load_mass * max(team.gravity, 1e-3) / n, 1e-6),
             kappa=self.barrier,
             kappa_rate=RATE_BARRIER,
             kappa_pair=self.spread,
             min_angle=least,
             reach=reach,
-            max_rate=self.max_rate,
+            max_rate=self.turn_rate(team),
             settling=self.settling,
             turning=self.turning,
             price=GIVE_WAY * float(weights.max()),
@@ -425,17 +475,25 @@ class Safe(AllocatorPart):
         return np.zeros(MEMORY.size(n) + LIMIT.size(limits) + PAIR.size(pairs) + 4 * n * n)
 
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
-        mu = self.mu
+        mu = _of_paper("mu") if self.mu is None else self.mu
         if self.mu_scaling == "weight":
-            mu *= float(np.sum((tensions @ directions) ** 2)) / self.mu_force**2
+            force = self.mu_force or _of_paper("mu_force")
+            mu *= float(np.sum((tensions @ directions) ** 2)) / force**2
         weights = self._relative_weights(len(tensions))
         return paper_objective(mu, np.sqrt(weights) * tensions, directions)
 
 
+def _of_paper(name: str) -> float:
+    """Value of a setting for a team of which nothing more is known."""
+    value = Safe.from_team[name]
+    assert value is not None
+    return value
+
+
 class _Further(TypedDict, total=False):
-    mu_scaling: Literal["absolute", "weight"]
-    mu_force: float
-    max_rate: float
+    mu_scaling: Literal["absolute", "weight"] | None
+    mu_force: float | None
+    max_rate: float | None
     max_thrust: float | list[float] | None
     max_tilt_deg: float | None
     weights: float | list[float]
@@ -450,7 +508,7 @@ class _Further(TypedDict, total=False):
 class SafeSettings(_Further, total=False):
     """The settings of :class:`Safe` as keywords, so that a type checker knows their names."""
 
-    mu: float
+    mu: float | None
     min_angle_deg: float
     tension_min: float | list[float] | None
     tension_max: float | list[float] | None
@@ -514,7 +572,7 @@ class SafeAllocator(Allocator):
     @property
     def mu(self) -> float:
         """Weight of the alignment penalty, N^2; may be changed between two calls."""
-        return self.part.mu
+        return self.part.penalty(self._team)
 
     @mu.setter
     def mu(self, value: float) -> None:

@@ -98,16 +98,30 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
         for j in range(past, 0, -1):
             for k in range(3):
                 memory[was + 3 * j + k] = memory[was + 3 * (j - 1) + k]
+        # Roll and pitch share the rotors: each axis has what the other leaves.
+        split = (abs(ex) + abs(ey)) / max(math.sqrt(ex * ex + ey * ey), 1e-300)
+        asked = 0.0
         for k in range(3):
             J, K_d, most = params[c + P.J + k], params[c + P.K_d + k], params[c + P.most + k]
             # No faster towards the wanted attitude than half of the torque can stop.
-            cap = math.sqrt(2.0 * most * abs(errors[k]))
-            turn = min(max(params[P.rho + k] * errors[k], -cap), cap)
-            limit = J * most
-            wanted = min(max(-K_d * (turning[k] - Omega_d[i, k] + turn), -limit), limit)
+            size = abs(errors[2]) if k == 2 else math.sqrt(ex * ex + ey * ey)
+            cap = math.sqrt(2.0 * most * size / (1.0 if k == 2 else max(split, 1.0)))
+            reach = params[P.rho + k] * size
+            turn = errors[k] * (params[P.rho + k] if reach <= cap else cap / size)
+            wanted = -K_d * (turning[k] - Omega_d[i, k] + turn)
             # The motors' lag is inverted: at the end of the period acts what is wanted now.
             acting = memory[act + k]
-            tau[i, k] = min(max(acting + (wanted - acting) / (1.0 - keep), -limit), limit)
+            wanted = min(max(wanted, -J * most), J * most)
+            tau[i, k] = acting + (wanted - acting) / (1.0 - keep)
+            if k < 2:
+                asked += abs(tau[i, k]) / (J * most)
+        for k in range(3):
+            limit = params[c + P.J + k] * params[c + P.most + k]
+            if k == 2:
+                tau[i, k] = min(max(tau[i, k], -limit), limit)
+            elif asked > 1.0:
+                tau[i, k] /= asked
+            acting = memory[act + k]
             memory[act + k] = keep * acting + (1.0 - keep) * tau[i, k]
             memory[was + k] = tau[i, k] + linger * (acting - tau[i, k])
 
@@ -128,6 +142,7 @@ class DelayAware(AttitudeControlPart, Delays):
     gain_setting: ClassVar[str] = "delay"
 
     per_drone = ("max_acceleration", "max_yaw_acceleration")
+    of_all = per_drone
     from_team: ClassVar[Mapping[str, float | None]] = {
         "max_acceleration": 40.0,
         "max_yaw_acceleration": 2.0,
@@ -158,6 +173,13 @@ class DelayAware(AttitudeControlPart, Delays):
     def gains(self, team: Team) -> tuple[Vector, Vector, Vector]:
         rate = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
         return rate * team.inertias, np.zeros((team.n, 3)), np.tile(0.5 * rate, (team.n, 1))
+
+    def turning(self, team: Team) -> float:
+        known = np.isfinite(self.left_open(team)["max_acceleration"]).all()
+        if self.max_acceleration is None and not known:
+            return math.inf
+        most = float(np.min(self.settled("max_acceleration", team)))
+        return most / self.bandwidths().rate ** 2
 
     def made_up_for(self) -> tuple[float, float]:
         return (self.delay, self.lag) if self.predicted else (0.0, 0.0)

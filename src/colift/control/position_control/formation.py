@@ -151,6 +151,7 @@ class Formation(PositionControlPart, Delays):
     remembers = MEMORY
 
     per_drone = ("max_thrust", "rotor_drag")
+    of_all = ("max_thrust",)
     from_team: ClassVar[Mapping[str, float | None]] = {"max_thrust": None, "rotor_drag": 0.0}
 
     gain: Annotated[float, Field(gt=0.0, le=3.0)] = 0.85

@@ -5,6 +5,7 @@ A file in this folder, an entry point of the group ``colift.vehicle`` or any TOM
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -111,6 +112,32 @@ def estimated_inertia(mass: float, arm: float) -> Moments:
     return (0.25 * J, 0.25 * J, 0.5 * J)
 
 
+THRUST_PER_MASS = 24.0
+"""Largest thrust of a drone of which nobody says it, N/kg: 2.4 times its weight, as chosen for the paper's drone."""
+PAPER_ARM = 0.2
+"""Chosen for the paper's drone, which names none, m."""
+PAPER_TORQUE_RATIO = 0.016
+"""Likewise, m: near that of RotorS' Hummingbird."""
+USUAL_LAG = 0.02
+"""Time constant of a motor's thrust, s: between those of that model, 12.5 ms up and 25 ms down."""
+
+
+def usual_arm(mass: float, inertia: Moments) -> float:
+    """From the centre to a rotor's axis, m, of a drone of which nobody says it.
+
+    The other way round of :func:`estimated_inertia`; with the paper's inertia, as with an unknown one, that of a
+    drone like the paper's made larger or smaller, whose mass grows with the cube of its size.
+    """
+    if tuple(inertia) == PAPER_INERTIA:
+        return float(PAPER_ARM * (mass / PAPER_MASS) ** (1.0 / 3.0))
+    return 2.0 * math.sqrt(max(inertia[:2]) / mass)
+
+
+def usual_torque_ratio(arm: float) -> float:
+    """Torque about a motor's axis per thrust, m: rotors that are larger turn slower."""
+    return PAPER_TORQUE_RATIO * (arm / PAPER_ARM)
+
+
 @dataclass(frozen=True)
 class Body:
     """The numbers of one drone: ``numbers`` by field, and whether its inertia is an estimate, or the paper's for lack of one."""
@@ -122,17 +149,17 @@ class Body:
 def complete(given: Mapping[str, Any], vehicle: Vehicle | None = None) -> Body:
     """What is known of a drone: what is given, else its vehicle's numbers, else what follows from them.
 
-    Without mass it has the paper's. Without inertia it has the estimate, or without ``arm`` the paper's.
+    Without mass it has the paper's. Without inertia it has the estimate, where need be for the usual arm; with the paper's mass and
+    no arm, the paper's.
     """
     numbers = {**(vehicle.numbers() if vehicle else {}), **given}
     source: Any = "given" if "inertia" in given else "vehicle"
     numbers.setdefault("mass", PAPER_MASS)
     if "inertia" not in numbers:
-        known = "arm" in numbers
+        mass, known = numbers["mass"], "arm" in numbers or numbers["mass"] != PAPER_MASS
         source = "estimate" if known else "paper"
-        numbers["inertia"] = (
-            estimated_inertia(numbers["mass"], numbers["arm"]) if known else PAPER_INERTIA
-        )
+        arm = numbers.get("arm", usual_arm(mass, PAPER_INERTIA))
+        numbers["inertia"] = estimated_inertia(mass, arm) if known else PAPER_INERTIA
     if {"arm", "rotor_radius"} <= numbers.keys():
         numbers.setdefault("radius", numbers["arm"] + numbers["rotor_radius"])
     return Body(numbers, source)

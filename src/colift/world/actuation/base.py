@@ -30,13 +30,22 @@ class ActuationPart(Part):
     def thrust_path(self, team: Team) -> str:
         """Path in the mission of what limits the thrust, for messages: the drones' number or the setting."""
         known = np.isfinite(team.max_thrusts).all()
-        if known and np.array_equal(self.thrust_limits(team), team.max_thrusts):
+        given = self.thrust_setting in self.model_fields_set
+        if known and not given and np.array_equal(self.thrust_limits(team), team.max_thrusts):
             return "drones.max_thrust"
         return f"{self.layer}.{self.thrust_setting}"
 
     def motor_lag(self) -> float:
         """Time constant of the motors, s."""
         return 0.0
+
+    def assumed(self, team: Team) -> dict[str, Vector]:
+        """Numbers (n,) of drones that they do not have of themselves, by field, as this part has them."""
+        return {}
+
+    def guessed(self, team: Team) -> set[str]:
+        """Those of :meth:`assumed` that neither the drones nor this part's settings say."""
+        return set()
 
     def thrust_limits(self, team: Team) -> Vector:
         """Largest steady thrust of each drone (n,), N; inf where there is no limit.

@@ -14,7 +14,7 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import noise
 from colift.kernel.math.smooth import decay
 from colift.part import Vector
-from colift.team import Team
+from colift.team import Team, vehicles
 from colift.world.actuation.base import SIGNATURE, ActuationPart
 
 Thrust = Annotated[float, Field(gt=0.0, le=1e4)]
@@ -29,6 +29,11 @@ RISE = 0.03
 """Time in which a motor whose largest thrust is known gets there from none, s."""
 NOISE = 1.0 / 300.0
 """Standard deviation of such a motor's thrust over its largest."""
+
+OF_DRONES = {
+    "max_thrust": "max_thrust", "motor_lag": "time_constant", "arm": "arm_length", "torque_ratio": "torque_ratio",
+}  # fmt: skip
+"""Settings here, by the field of the drones that says the same of all four motors."""
 
 # Motors stand at (x, y) = arm / sqrt(2) times these, and turn their drone about z by the third.
 _X = (1.0, -1.0, -1.0, 1.0)
@@ -137,9 +142,9 @@ class Motors(ActuationPart):
     not allow all, yaw gives way first; near full thrust, thrust gives way to roll and pitch, for a drone that
     cannot turn cannot aim; near none, they give way to it. A weak motor gives its share; the mixer is not told.
 
-    What is left out is the vehicle's (``drones``); what that does not tell either is chosen for the paper's drone of
-    0.5 kg: 2.4 times its weight, a lag between those of RotorS' Hummingbird (12.5 ms up, 25 ms down) and a torque
-    ratio near that model's 0.016 m. With six or eight rotors, each motor here stands for a quarter of them, on an arm
+    What is left out is the vehicle's (``drones``); what that does not tell either is usual: 2.4 times the drone's weight, 20 ms
+    of lag, between those of RotorS' Hummingbird (12.5 ms up, 25 ms down), an arm that goes with mass and inertia, and
+    a torque ratio that grows with it and is near that model's 0.016 m at 0.2 m. With six or eight rotors, each motor here stands for a quarter of them, on an arm
     that turns the drone as much as they can about their weaker axis: with N rotors at distance a, of which the
     outermost may change by d, these are 4 (d N / 4) a / 2.
     """
@@ -149,29 +154,25 @@ class Motors(ActuationPart):
     per_drone = (
         "arm_length", "torque_ratio", "max_thrust", "time_constant", "max_rate", "noise",
     )  # fmt: skip
-    from_team: ClassVar[Mapping[str, float | None]] = {
-        "arm_length": 0.2, "torque_ratio": 0.016, "max_thrust": 3.0, "time_constant": 0.02, "max_rate": 100.0,
-        "noise": 0.01,
-    }  # fmt: skip
+    from_team: ClassVar[Mapping[str, float | None]] = dict.fromkeys(per_drone)
     thrust_setting: ClassVar[str] = "max_thrust"
 
     arm_length: Length | list[Length] | None = None
     """From the centre to a rotor, m; one value, or one for each drone, as of all that follow but ``min_thrust`` and
-    ``centre_offset``. None: ``drones.arm``, or 0.2."""
+    ``centre_offset``. None: ``drones.arm``, or the usual."""
     torque_ratio: Ratio | list[Ratio] | None = None
-    """Torque about a motor's axis per thrust, m. None: ``drones.torque_ratio``, or 0.016."""
+    """Torque about a motor's axis per thrust, m. None: ``drones.torque_ratio``, or the usual."""
     max_thrust: Thrust | list[Thrust] | None = None
-    """Largest thrust of one motor, N. None: a quarter of ``drones.max_thrust``, or 3."""
+    """Largest thrust of one motor, N. None: a quarter of ``drones.max_thrust``, or 6 for each kg."""
     min_thrust: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
     """Least thrust of one motor, N: motors that must not stop."""
     time_constant: Lag | list[Lag] | None = None
     """Of the lag of a motor's thrust, s. None: ``drones.motor_lag``, or 0.02."""
     max_rate: Rate | list[Rate] | None = None
-    """Fastest change of a motor's thrust, N/s. None: what reaches the largest thrust that ``drones`` tells from none in
-    30 ms, or 100."""
+    """Fastest change of a motor's thrust, N/s. None: what reaches the largest thrust from none in 30 ms."""
     noise: Noise | list[Noise] | None = None
-    """Standard deviation of a motor's thrust, N; it has the motor's bandwidth. None: a 300th of the largest thrust
-    that ``drones`` tells, or 0.01."""
+    """Standard deviation of a motor's thrust, N; it has the motor's bandwidth. None: a 300th of its
+    largest thrust."""
     centre_offset: tuple[Offset, Offset] = (0.0, 0.0)
     """Centre of gravity from the centre of the rotors, body x and y, m; the mixer is not told."""
 
@@ -184,15 +185,32 @@ class Motors(ActuationPart):
         return []
 
     def left_open(self, team: Team) -> dict[str, Vector]:
-        most = 0.25 * team.max_thrusts
+        bodies = zip(team.masses.tolist(), team.inertias.tolist(), strict=True)
+        usual = [vehicles.usual_arm(mass, tuple(inertia)) for mass, inertia in bodies]
+        arms = np.where(np.isfinite(team.arms), team.arms, usual)
+        ratios = [vehicles.usual_torque_ratio(arm) for arm in arms.tolist()]
+        known = np.isfinite(team.max_thrusts)
+        weak = np.where(known, team.max_thrusts, vehicles.THRUST_PER_MASS * team.masses)
+        given = self.max_thrust
+        most = 0.25 * weak if given is None else np.broadcast_to(np.asarray(given), team.n)
+        lags = np.where(np.isfinite(team.motor_lags), team.motor_lags, vehicles.USUAL_LAG)
         return {
-            "arm_length": team.arms, "torque_ratio": team.torque_ratios, "max_thrust": most,
-            "time_constant": team.motor_lags, "max_rate": most / RISE, "noise": NOISE * most,
+            "arm_length": arms,
+            "torque_ratio": np.where(np.isfinite(team.torque_ratios), team.torque_ratios, ratios),
+            "max_thrust": 0.25 * weak, "time_constant": lags, "max_rate": most / RISE,
+            "noise": NOISE * most,
         }  # fmt: skip
+
+    def assumed(self, team: Team) -> dict[str, Vector]:
+        own = {field: self.settled(name, team) for field, name in OF_DRONES.items()}
+        return own | {"max_thrust": 4.0 * own["max_thrust"]}
+
+    def guessed(self, team: Team) -> set[str]:
+        return {field for field, name in OF_DRONES.items() if name not in self.model_fields_set}
 
     def motor_lag(self) -> float:
         if self.time_constant is None:
-            return float(self.from_team["time_constant"] or 0.0)
+            return vehicles.USUAL_LAG
         return float(np.max(self.time_constant))
 
     def thrust_limits(self, team: Team) -> Vector:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import ClassVar
 
+import numpy as np
+
 from colift.kernel.ports import PORTS
-from colift.part import Part, Setup
+from colift.part import Part, Setup, Vector
 
 SIGNATURE = PORTS["disturbance"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
@@ -24,6 +26,10 @@ class DisturbancePart(Part):
     """Whether it adds to the wind."""
     feels_wind: ClassVar[bool] = False
     """Whether it turns wind into forces."""
+
+    def strongest_wind(self) -> Vector:
+        """What it adds to the wind (3,) at its strongest, world frame, m/s, as long as a team takes to answer it."""
+        return np.zeros(3)
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         if self.makes_wind and not any(part.feels_wind for part in mission.disturbance):

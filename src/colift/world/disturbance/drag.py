@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
@@ -13,11 +14,16 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.part import Vector
 from colift.team import Team
+from colift.team.scaling import PAPER_LOAD
+from colift.team.vehicles import PAPER_MASS
 from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Area = Annotated[float, Field(ge=0.0, le=10.0)]
 Linear = Annotated[float, Field(ge=0.0, le=10.0)]
 RotorDrag = Annotated[float, Field(ge=0.0, le=1.0)]
+
+DRONE_AREA, LOAD_AREA, CABLE_DIAMETER = 0.012, 0.006, 0.0015
+"""Of the paper's drone and load (m^2) and cables (m), which it does not say: chosen."""
 
 # Gauss and Legendre's three points on (0, 1): exact for polynomials up to degree five.
 _POINTS = (0.5 - 0.5 * math.sqrt(0.6), 0.5, 0.5 + 0.5 * math.sqrt(0.6))
@@ -25,10 +31,9 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 PARAMS = Layout(
     team={
-        "density": 1, "drone_area": 1, "drone_linear": 1, "load_area": 1, "load_linear": 1,
-        "cable": 1,
+        "density": 1, "drone_linear": 1, "load_area": 1, "load_linear": 1, "cable": 1,
     },
-    drone={"rotor_drag": 1},
+    drone={"drone_area": 1, "rotor_drag": 1},
 )  # fmt: skip
 """``cable``: drag coefficient times diameter."""
 P = PARAMS.at
@@ -57,7 +62,7 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     )  # fmt: skip
     for i in range(n):
         _on_body(
-            velocities[i], wind, half_rho * params[P.drone_area], params[P.drone_linear],
+            velocities[i], wind, half_rho * params[P.rows + P.width * i + P.drone_area], params[P.drone_linear],
             external[i],
         )  # fmt: skip
         rotor_drag = params[P.rows + P.width * i + P.rotor_drag]
@@ -104,34 +109,44 @@ class Drag(DisturbancePart):
 
     kernel = _drag
     feels_wind: ClassVar[bool] = True
-    per_drone = ("rotor_drag",)
-    from_team: ClassVar[Mapping[str, float | None]] = {"rotor_drag": 0.0}
+    per_drone = ("drone_area", "rotor_drag")
+    from_team: ClassVar[Mapping[str, float | None]] = {
+        "drone_area": None, "load_area": None, "rotor_drag": 0.0, "cable_diameter": None,
+    }  # fmt: skip
 
     air_density: Annotated[float, Field(ge=0.0, le=10.0)] = 1.225
     """kg/m^3."""
-    drone_area: Area = 0.012
-    """Drag coefficient times frontal area of a drone's body, m^2."""
+    drone_area: Area | list[Area] | None = None
+    """Drag coefficient times frontal area of a drone's body, m^2. None: 0.012 for a drone of 0.5 kg, and as the surface of
+    bodies of the same make grows with their mass."""
     drone_linear: Linear = 0.0
     """Linear drag of a drone, N s/m."""
-    load_area: Area = 0.006
-    """Drag coefficient times frontal area of the load, m^2 (about that of a cube of 7.5 cm)."""
+    load_area: Area | None = None
+    """Drag coefficient times frontal area of the load, m^2. None: 0.006 for 0.225 kg (about that of a cube of 7.5 cm), and for
+    others as the surface of bodies of the same density."""
     load_linear: Linear = 0.0
     """Linear drag of the load, N s/m."""
     rotor_drag: RotorDrag | list[RotorDrag] | None = None
     """Force in the rotors' plane per thrust and speed across it, s/m; one value, or one for each drone. Small racing
     quadrotors have some 0.05, that is half their weight at 10 m/s. None: ``drones.rotor_drag``, or 0."""
-    cable_diameter: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0015
-    """m."""
+    cable_diameter: Annotated[float, Field(ge=0.0, le=0.1)] | None = None
+    """m. None: 0.0015 for a load of 0.225 kg, and for others so that cables are stressed as much."""
     cable_coefficient: Annotated[float, Field(ge=0.0, le=3.0)] = 1.2
     """Drag coefficient of the cables across the wind (a cylinder's below Re = 10^5)."""
 
     def left_open(self, team: Team) -> dict[str, Vector]:
-        return {"rotor_drag": team.rotor_drags}
+        heavier = team.load_mass / PAPER_LOAD
+        return {
+            "drone_area": DRONE_AREA * (team.masses / PAPER_MASS) ** (2.0 / 3.0),
+            "load_area": np.full(team.n, LOAD_AREA * heavier ** (2.0 / 3.0)),
+            "rotor_drag": team.rotor_drags,
+            "cable_diameter": np.full(team.n, CABLE_DIAMETER * math.sqrt(heavier)),
+        }
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(
-            team.n, density=self.air_density, drone_area=self.drone_area,
-            drone_linear=self.drone_linear, load_area=self.load_area, load_linear=self.load_linear,
-            rotor_drag=self.settled("rotor_drag", team),
-            cable=self.cable_diameter * self.cable_coefficient,
+            team.n, density=self.air_density, drone_area=self.settled("drone_area", team),
+            drone_linear=self.drone_linear, load_area=float(self.settled("load_area", team)[0]),
+            load_linear=self.load_linear, rotor_drag=self.settled("rotor_drag", team),
+            cable=float(self.settled("cable_diameter", team)[0]) * self.cable_coefficient,
         )  # fmt: skip

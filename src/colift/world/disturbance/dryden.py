@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline, kernel
@@ -95,6 +96,10 @@ def _dryden(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     wind[2] += w
 
 
+LASTING = 0.35
+"""Gusts that last long enough to be answered to, over the mean wind."""
+
+
 class Dryden(DisturbancePart):
     """Turbulence with Dryden's spectra; the same for all bodies, which are near for its length scales.
 
@@ -113,6 +118,10 @@ class Dryden(DisturbancePart):
     23.1 severe."""
     heading_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
     """Where the mean wind blows to, degrees from x towards y: the axis of the longitudinal part."""
+
+    def strongest_wind(self) -> Vector:
+        heading = math.radians(self.heading_deg)
+        return LASTING * self.speed * np.array([math.cos(heading), math.sin(heading), 0.0])
 
     def params(self, team: Team) -> Vector:
         heading = math.radians(self.heading_deg)

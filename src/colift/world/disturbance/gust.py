@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import kernel
@@ -38,6 +39,10 @@ def _gust(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             wind[k] += size * params[P.peak + k]
 
 
+LASTING = 0.36
+"""Share of the peak that lasts long enough to be answered to."""
+
+
 class Gust(DisturbancePart):
     """``peak / 2 (1 - cos(2 pi t / duration))``, once or again and again (the shape of CS-25.341 / FAR 25.341)."""
 
@@ -53,6 +58,9 @@ class Gust(DisturbancePart):
     every: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
     """Interval in which one gust comes, at a random time and with a random share of the peak, s; 0: a
     single gust, at its time and whole."""
+
+    def strongest_wind(self) -> Vector:
+        return LASTING * np.array(self.peak)
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import kernel
@@ -47,7 +48,10 @@ class Wind(DisturbancePart):
     ramp: Annotated[float, Field(ge=0.0, le=1e3)] = 2.0
     """Time in which it rises to its full speed, s."""
 
-    def params(self, team: Team) -> Vector:
+    def strongest_wind(self) -> Vector:
         heading = math.radians(self.heading_deg)
         level = [self.speed * math.cos(heading), self.speed * math.sin(heading)]
-        return PARAMS.pack(team.n, velocity=[*level, self.updraft], ramp=self.ramp)
+        return np.array([*level, self.updraft])
+
+    def params(self, team: Team) -> Vector:
+        return PARAMS.pack(team.n, velocity=self.strongest_wind(), ramp=self.ramp)

@@ -371,15 +371,9 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
                 )
             )
     most = float(np.sum(settings.tension_caps(team)))
-    if most < weight:
-        by_drones = "tension_max" in settings.by_team(team)
-        beside = ", what the drones lift beside themselves" if by_drones else ""
-        found.append(
-            (
-                "drones.max_thrust" if by_drones else "tension_max",
-                f"tension_max (together {most:.4g} N{beside}) conflicts with the load's weight of {weight:.4g} N",
-            )
-        )
+    if most < weight and "tension_max" not in settings.by_team(team):
+        message = f"tension_max (together {most:.4g} N) conflicts with the load's weight of {weight:.4g} N"
+        found.append(("tension_max", message))
     lowest = float(np.sum(settings.tension_floors(team))) * math.cos(cone)
     if lowest > weight:
         found.append(

@@ -1,0 +1,134 @@
+"""Before the flight: what the wind of a mission asks of its team, and the margins that are left.
+
+Of what the controllers are told, and of the disturbances that the mission names. Each number is a quotient or an angle that a
+stranger can check by hand; what they are worth is measured on random flights (``benchmarks/any_team.py``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.control.allocation.base import Allocation
+from colift.control.attitude_control.base import AttitudeControlPart
+from colift.part import Part
+from colift.team import Team
+from colift.world.disturbance.base import DisturbancePart
+
+Array = NDArray[np.float64]
+
+MOST_THRUST = 0.87
+"""Share of a drone's thrust from which the wind's strongest may leave it nothing to turn with."""
+MOST_LEAN = math.radians(70.0)
+"""Lean of the load in the wind beyond which three cables or more cannot all stay taut."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What the strongest wind of a mission does to its team.
+
+    Attributes
+    ----------
+    wind : (3,) array
+        World frame, m/s.
+    thrusts : (n,) array
+        What each drone needs in it, N.
+    limits : (n,) array
+        What each has, N; inf where nobody knows.
+    lean : float
+        Of the force that holds the load, from the vertical, rad.
+    offset : float
+        By how much the load hangs aside of a place straight below its drones, m.
+    turning : float
+        Angular acceleration that the rotors give over the squared bandwidth of the body-rate loop; inf where that is not known.
+
+    """
+
+    wind: Array
+    thrusts: Array
+    limits: Array
+    lean: float
+    offset: float
+    turning: float
+
+    @property
+    def thrust(self) -> float:
+        """Largest share of its thrust that a drone needs."""
+        return float(np.max(self.thrusts / self.limits))
+
+    def problems(self, team: Team, allowed: float) -> Iterable[tuple[str, str]]:
+        """Why this cannot be flown, by the layer at fault; ``allowed`` is the most error of the load's place, m."""
+        speed = float(np.linalg.norm(self.wind))
+        if speed == 0.0:
+            return
+        if self.thrust > MOST_THRUST:
+            i = int(np.argmax(self.thrusts / self.limits))
+            yield (
+                "actuation",
+                f"in {speed:.3g} m/s of wind drone {i} needs {self.thrusts[i]:.4g} N of thrust to stay, of the {self.limits[i]:.4g} N "
+                f"that it has; beyond {100.0 * MOST_THRUST:g} % nothing is left to turn with",
+            )
+        if team.n >= 3 and self.lean > MOST_LEAN:
+            yield (
+                "disturbance",
+                f"{speed:.3g} m/s of wind push the load of {team.load_mass:.4g} kg so hard that it leans by {math.degrees(self.lean):.3g} "
+                f"degrees, where not all of {team.n} cables can stay taut (at most {math.degrees(MOST_LEAN):g})",
+            )
+        if team.n <= 2 and self.offset > allowed:
+            yield (
+                "disturbance",
+                f"{speed:.3g} m/s of wind blow the load {self.offset:.3g} m aside before {team.n} drones have learnt of it, more than "
+                f"the {allowed:.3g} m that criteria.tracking_max_m allows",
+            )
+
+
+def forecast(
+    team: Team,
+    hover: Allocation,
+    limits: Array,
+    disturbances: Sequence[Part],
+    attitude: Part,
+) -> Forecast:
+    """Judge a team that hovers as its allocator has it; ``limits`` (n,) is the thrust of each drone, N."""
+    parts = [each for each in disturbances if isinstance(each, DisturbancePart)]
+    wind = np.sum([np.zeros(3), *(each.strongest_wind() for each in parts)], axis=0)
+    pushes = np.zeros((team.n + 1, 3))
+    if wind.any():
+        for part in parts:
+            if part.feels_wind:
+                pushes += _pushes(team, hover, part, wind)
+    needed = team.hover_forces(hover.tensions, hover.directions)
+    shares = hover.tensions / max(float(hover.tensions.sum()), 1e-300)
+    across = np.hypot(needed[:, 0], needed[:, 1]) + np.hypot(pushes[:-1, 0], pushes[:-1, 1])
+    across += shares * math.hypot(pushes[-1, 0], pushes[-1, 1])
+    up = needed[:, 2] - np.minimum(pushes[:-1, 2] + shares * pushes[-1, 2], 0.0)
+    weight = max(team.load_mass * team.gravity, 1e-300)
+    lean = math.atan2(math.hypot(pushes[-1, 0], pushes[-1, 1]), weight)
+    turning = attitude.turning(team) if isinstance(attitude, AttitudeControlPart) else math.inf
+    return Forecast(
+        wind, np.hypot(up, across), limits, lean, float(team.cable_lengths.max()) * math.tan(lean), turning
+    )  # fmt: skip
+
+
+def _pushes(team: Team, hover: Allocation, part: DisturbancePart, wind: Array) -> Array:
+    """Forces (n+1, 3) of a wind on the bodies of a team at rest, N."""
+    signals: Mapping[str, Any] = {
+        "load": np.zeros((2, 3)),
+        "ends": np.zeros((team.n, 2, 3)),
+        "positions": np.ascontiguousarray(-team.cable_lengths[:, None] * hover.directions),
+        "velocities": np.zeros((team.n, 3)),
+        "directions": np.ascontiguousarray(hover.directions),
+        "direction_rates": np.zeros((team.n, 3)),
+        "attitudes": np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1)),
+        "applied_thrusts": team.hover_thrusts(hover.tensions, hover.directions),
+        "attached": np.ones(team.n),
+        "wind": np.array(wind),
+        "external_forces": np.zeros((team.n + 1, 3)),
+    }
+    writes, _ = part.call(team, part.memory(team), **signals)
+    return np.asarray(writes.external_forces)
