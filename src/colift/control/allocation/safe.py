@@ -23,7 +23,7 @@ from colift.control.allocation.base import (
     Status,
 )
 from colift.control.allocation.common.oracle import paper_objective
-from colift.control.allocation.limits import cycle, newton
+from colift.control.allocation.limits import cycle, distance, newton, recovery
 from colift.control.allocation.limits import feasibility as feasible
 from colift.control.allocation.paper import newton as paper
 from colift.errors import Problem, SettingError
@@ -40,18 +40,18 @@ _INVALID_FORCE = int(Status.INVALID_FORCE)
 _FORCE_REDUCED = int(Status.FORCE_REDUCED)
 _RECOVERING = int(Status.RECOVERING)
 """Where ``info`` has a sixth place: which kinds of limits push, one bit each in the order of
-:mod:`colift.control.allocation.limits.newton`; 64 stands for the pairs."""
+:mod:`colift.control.allocation.limits.newton`; of pairs 64 stands for the angle, 128 for the distance of drones, 256 for that from a cable."""
 
 MEMORY = Layout(
     team={"S": newton.SYSTEM, "lam": 3, "M": 6, "facing": 3, "yielded": 1, "asked": 3},
     drone={
         "data": newton.DATA, "T": 1, "alpha": 3, "start": 3, "w": 3, "dw": 3, "w_new": 3,
-        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1,
+        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1, "length": 1, "size": 1,
     },
 )  # fmt: skip
 """In columns; those of every limit, of every pair, and the matrix ``K`` follow. A team that changes starts anew."""
 LIMIT = Layout(drone={"g": 1, "g_new": 1, "z": 1})
-PAIR = Layout(drone={"kappa": 1, "cos_max": 1, "both": 2})
+PAIR = Layout(drone={"kappa": 1, "cos_max": 1, "both": 2, "cause": 1, "root": 1})
 MASK = 0xFFFFF
 """No team has more drones: so told, the compiler knows that no index along the team is negative."""
 C, L, N, P = MEMORY.at, LIMIT.at, PAIR.at, cycle.PARAMS.at
@@ -65,7 +65,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     tensions, directions = writes.desired_tensions, writes.desired_directions
     info = writes.allocator_info
     n = tensions.shape[0] & MASK
-    most = n * (n - 1) // 2
+    most = n * (n - 1)  # angle and ellipsoid of every pair
     count = newton.LIMITS * n + most
     limits = C.rows + C.width * n
     near = limits + L.width * count
@@ -83,6 +83,9 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         pairs=column(memory, near, most, PAIRS.both),
         kappa_pair=column(memory, near, most, PAIRS.kappa),
         cos_max=column(memory, near, most, PAIRS.cos_max),
+        cause=column(memory, near, most, PAIRS.cause),
+        root=column(memory, near, most, PAIRS.root),
+        flat=params[P.flat],
         first=column(memory, C.rows, n, CABLES.first),
         rows=column(memory, C.rows, n, CABLES.row),
         K=memory[square : square + 4 * n * n],
@@ -124,8 +127,23 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     rho = params[P.settling] / period
 
     cycle.sort_cables(n, directions, order)
+    table = P.rows + P.width * n
+    apart = distance.Apart(
+        capped=params[P.capped] != 0.0,
+        stacked=params[P.stacked] != 0.0,
+        flat=params[P.flat],
+        table=params[table : table + n * n],
+        length=column(memory, C.rows, n, CABLES.length),
+        size=column(memory, C.rows, n, CABLES.size),
+        order=order,
+    )
+    if apart.stacked:
+        for i in range(n):
+            row = P.rows + P.width * int(order[i])
+            apart.length[i] = params[row + P.length]
+            apart.size[i] = params[row + P.size]
     relaxed = cycle.set_up(
-        n, order, W, unit, delta, acceleration, tensions, directions, params, start, work
+        n, order, W, unit, delta, acceleration, tensions, directions, params, start, apart, work
     )
     if W > 1e-6 and not relaxed:
         follow = period / (params[P.turning] + period)
@@ -133,7 +151,12 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     edge = params[P.cos_edge]
     if 2.0 * delta > params[P.reach]:
         edge = math.cos(min(params[P.min_angle] + 2.0 * delta, math.pi))
-    m = cycle.near_pairs(n, params[P.cos_angle], edge, params[P.kappa_pair], start, work)
+    m = caps = cycle.near_pairs(n, params[P.cos_angle], edge, params[P.kappa_pair], start, apart, work)
+    if apart.stacked:
+        m = distance.near_ellipsoids(
+            n, m, params[P.reach], delta, params[P.kappa_pair], recovery.SURE, recovery.ROOM, recovery.FIRM,
+            start, apart, work,
+        )  # fmt: skip
     heavy = max(1.0, abs(fz) / n)
     leaning = 0.0
     if yielded[0] > 0.0:
@@ -153,8 +176,8 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         tolerance=params[P.tolerance],
         max_iterations=int(params[P.iterations]),
     )
-    outcome = cycle.iterate(n, kinds, m, task, work, info)
-    info[INFO_ACTIVE] = cycle.active_limits(n, kinds, m, work.z)
+    outcome = cycle.iterate(n, kinds, caps, m, task, work, info)
+    info[INFO_ACTIVE] = cycle.active_limits(n, kinds, m, work.cause, work.z)
     squares = M[0] * M[0] + M[3] * M[3] + M[5] * M[5]
     squares += 2.0 * (M[1] * M[1] + M[2] * M[2] + M[4] * M[4])
     J = 0.5 * mu * (squares - n)
@@ -176,7 +199,10 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
     reduced = balance > 1e-8 * max(1.0, sigma)
     yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
-    if relaxed and cycle.breaks_a_limit(n, order, unit, params, work):
+    if relaxed and cycle.breaks_a_limit(n, order, unit, params, apart, work):
+        if apart.capped or apart.stacked:
+            bits = distance.broken(n, apart, recovery.ROUNDING, alpha)
+            info[INFO_ACTIVE] = float(int(info[INFO_ACTIVE]) | bits)
         return _RECOVERING
     if reduced:
         return _FORCE_REDUCED
@@ -187,6 +213,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
 
 Degrees = Annotated[float, Field(gt=0.0, lt=90.0)]
 Force = Annotated[float, Field(gt=0.0, le=1e6)]
+Distance = Annotated[float, Field(ge=0.0, le=1e3)]
 
 RATE_BARRIER = 1.0
 """Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
@@ -198,6 +225,8 @@ MOST = 0.9
 """Share of a drone's thrust that is planned with then: with the rest it turns and resists the wind."""
 HIGH = 0.85
 """Share of it that holds the drone and its cable at the largest tension."""
+CLEAR = 1.2
+"""Distance that a drone keeps from all others' middle and cables where no limit is given, in its radii."""
 RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
 
@@ -213,11 +242,15 @@ class Safe(AllocatorPart):
 
     kernel = _allocate
     spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
-    per_drone = ("tension_min", "tension_max", "max_thrust", "weights")
+    per_drone = (
+        "tension_min", "tension_max", "max_thrust", "weights", "min_distance", "cable_distance",
+    )  # fmt: skip
     from_team: ClassVar[Mapping[str, float | None]] = {
         "tension_min": 0.05,
         "tension_max": 5.0,
         "max_thrust": None,
+        "min_distance": 0.0,
+        "cable_distance": 0.0,
     }
 
     mu: Annotated[float, Field(ge=0.0)] = 0.15
@@ -229,6 +262,14 @@ class Safe(AllocatorPart):
     """Force for which ``mu`` is meant when it is scaled, N (default: weight of the paper's load)."""
     min_angle_deg: Annotated[float, Field(gt=0.0, lt=150.0)] = 30.0
     """Least angle between any two cables, degrees."""
+    min_distance: Distance | list[Distance] | None = None
+    """Least distance between the centres of two drones, m; one value, or one per drone: two keep the mean of theirs. 0: not
+    limited. None: 2.4 of ``drones.radius`` where that is known, else 0."""
+    downwash: Annotated[float, Field(ge=1.0, le=10.0)] = 2.0
+    """How much more of ``min_distance`` drones keep above each other than beside each other."""
+    cable_distance: Distance | list[Distance] | None = None
+    """Least distance of a drone's centre from the others' cables, m; one value, or one per drone. 0: not limited. None: 1.2 of
+    ``drones.radius`` where that is known, else 0."""
     tension_min: Force | list[Force] | None = None
     """Least tension, N; one value, or one per cable. None: a tenth of a cable's share of the load's weight where
     ``drones.max_thrust`` is known, else 0.05."""
@@ -295,6 +336,8 @@ class Safe(AllocatorPart):
             "tension_min": np.where(known, LOW * share, math.nan),
             "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), math.nan),
             "max_thrust": MOST * team.max_thrusts,
+            "min_distance": 2.0 * CLEAR * team.radii,
+            "cable_distance": CLEAR * team.radii,
         }
 
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
@@ -364,14 +407,48 @@ class Safe(AllocatorPart):
         """Least tension of each cable (n,), N."""
         return self.settled("tension_min", team)
 
+    def drone_distances(self, team: Team) -> Vector:
+        """Least distance of each drone (n,), m: two keep the mean of theirs; 0: not limited."""
+        return self.settled("min_distance", team)
+
+    def cable_distances(self, team: Team) -> Vector:
+        """Least distance of each drone (n,) from the others' cables, m; 0: not limited."""
+        return self.settled("cable_distance", team)
+
+    def pair_angles(self, team: Team) -> tuple[Array, Array]:
+        """Least angle of every pair (n, n), rad, with what distances ask for, and the bit of the limit that asks for it.
+
+        Without the ellipsoids, which are no angles (:meth:`ellipsoids`).
+        """
+        sizes = self.drone_distances(team) if self.downwash == 1.0 else np.zeros(team.n)
+        return distance.angles_of(
+            team.cable_lengths, sizes, self.cable_distances(team), math.radians(self.min_angle_deg)
+        )
+
+    def ellipsoids(self, team: Team) -> bool:
+        """Whether ellipsoids about the drones limit more than the angles do already."""
+        sizes = self.drone_distances(team)
+        if self.downwash == 1.0 or team.n < 2 or not sizes.any():
+            return False
+        a, b = team.cable_lengths[:, None], team.cable_lengths[None, :]
+        angles, _ = self.pair_angles(team)
+        near = np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(angles)) / self.downwash
+        pairs = np.triu_indices(team.n, k=1)
+        return bool(np.any(near[pairs] < 0.5 * (sizes[:, None] + sizes[None, :])[pairs]))
+
     def params(self, team: Team) -> Vector:
         n = team.n
+        angles, causes = self.pair_angles(team)
+        table = np.triu(np.cos(angles)) + np.tril(causes, -1)
         most = self.thrust_limits(team)
         limited = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
         weights = self._relative_weights(n)
-        least, reach = math.radians(self.min_angle_deg), self._reach(n)
+        least = math.radians(self.min_angle_deg)
+        if n > 1:
+            least = float(angles[np.triu_indices(n, k=1)].max())
+        reach = self._reach(n, least)
         cone, tilt = math.radians(self.max_cone_deg), math.radians(self.max_tilt_deg or 89.0)
-        return cycle.PARAMS.pack(
+        packed = cycle.PARAMS.pack(
             n,
             mu=self.mu,
             mu_scaled=self.mu_scaling == "weight",
@@ -404,7 +481,13 @@ class Safe(AllocatorPart):
             T_max=self.tension_caps(team),
             m=team.masses,
             f_max=np.minimum(most, 1e6),
+            capped=bool(np.any(causes != distance.ANGLE)),
+            stacked=self.ellipsoids(team),
+            flat=1.0 / self.downwash**2,
+            length=team.cable_lengths,
+            size=self.drone_distances(team),
         )
+        return np.concatenate([packed, table.ravel()])
 
     def _relative_weights(self, n: int) -> Vector:
         """Weight of each cable (n,) relative to their mean; ones, exactly, where all are the same."""
@@ -412,15 +495,15 @@ class Safe(AllocatorPart):
         weights /= weights.max()
         return np.asarray(weights / weights.mean())
 
-    def _reach(self, n: int) -> float:
-        """Distance beyond the least angle at which a pair is seen, rad: about the second neighbours."""
-        cone, least = math.radians(self.max_cone_deg), math.radians(self.min_angle_deg)
+    def _reach(self, n: int, least: float) -> float:
+        """Distance beyond the least angle (rad) at which a pair is seen, rad: about the second neighbours."""
+        cone = math.radians(self.max_cone_deg)
         spacing = math.sqrt(1.15 * 2.0 * math.pi * (1.0 - math.cos(cone)) / n)
         return min(max(1.8 * spacing - least, 0.3 * least), math.radians(60.0))
 
     def memory(self, team: Team) -> Vector:
         n = team.n
-        pairs = n * (n - 1) // 2
+        pairs = n * (n - 1)
         limits = newton.LIMITS * n + pairs
         return np.zeros(MEMORY.size(n) + LIMIT.size(limits) + PAIR.size(pairs) + 4 * n * n)
 
@@ -445,6 +528,9 @@ class _Further(TypedDict, total=False):
     barrier: float
     tolerance: float
     max_iterations: int
+    min_distance: float | list[float] | None
+    downwash: float
+    cable_distance: float | list[float] | None
 
 
 class SafeSettings(_Further, total=False):
