@@ -151,7 +151,9 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     edge = params[P.cos_edge]
     if 2.0 * delta > params[P.reach]:
         edge = math.cos(min(params[P.min_angle] + 2.0 * delta, math.pi))
-    m = caps = cycle.near_pairs(n, params[P.cos_angle], edge, params[P.kappa_pair], start, apart, work)
+    m = caps = cycle.near_pairs(
+        n, params[P.cos_angle], edge, params[P.kappa_pair], start, apart, work
+    )
     if apart.stacked:
         m = distance.near_ellipsoids(
             n, m, params[P.reach], delta, params[P.kappa_pair], recovery.SURE, recovery.ROOM, recovery.FIRM,
@@ -316,6 +318,11 @@ class Safe(AllocatorPart):
     def check(self, team: Team) -> list[tuple[str, str]]:
         return self.wrong_lengths(team.n) or self._crossed(team)
 
+    def asked_angles(self, team: Team) -> tuple[Array, Array]:
+        """As :meth:`pair_angles`, with ellipsoids as the spheres within them: what no formation can do without."""
+        sizes, least = self.drone_distances(team), math.radians(self.min_angle_deg)
+        return distance.angles_of(team.cable_lengths, sizes, self.cable_distances(team), least)
+
     def _crossed(self, team: Team) -> list[tuple[str, str]]:
         """A given limit of the tension beyond the other, which is left to the team."""
         low, high = self.settled("tension_min", team), self.settled("tension_max", team)
@@ -369,7 +376,7 @@ class Safe(AllocatorPart):
         return self.settled("max_thrust", team)
 
     def cannot_start(self, team: Team, directions: Array) -> str:
-        if self._keeps_limits(directions):
+        if self.keeps_pairs(team, directions) and self._keeps_cone(directions):
             return ""
         allocator = SafeAllocator.unchecked(team, self)
         allocator.reset(directions)
@@ -378,6 +385,15 @@ class Safe(AllocatorPart):
             if answer.status is not Status.RECOVERING:
                 return ""
         polar = np.arccos(np.clip(-answer.directions[:, 2], -1.0, 1.0))
+        drones, cables = self.distances(team, answer.directions)
+        metres = "".join(
+            f", {name} = {np.max(asked):g} m where {np.min(found):.3g} m would be left"
+            for name, asked, found in (
+                ("min_distance", self.drone_distances(team), drones),
+                ("cable_distance", self.cable_distances(team), cables),
+            )
+            if np.any(asked > 0.0) and team.n > 1
+        )
         apart, widest = (
             f"{math.degrees(angle):.1f} degrees"
             for angle in (
@@ -388,16 +404,28 @@ class Safe(AllocatorPart):
         return (
             f"breaks a limit and cannot be led back: after {RECOVERY:g} s of hover the {team.n} cables would "
             f"be {apart} apart and up to {math.degrees(polar.max()):.1f} degrees from the vertical "
-            f"(allocation.min_angle_deg = {self.min_angle_deg:g}, max_cone_deg = {self.max_cone_deg:g}; "
+            f"(allocation.min_angle_deg = {self.min_angle_deg:g}, max_cone_deg = {self.max_cone_deg:g}{metres}; "
             f"the widest formation in that cone has {widest}): start within the limits, with "
             "start.directions where one ring is too narrow, or ask for less"
         )
 
-    def _keeps_limits(self, directions: Array) -> bool:
-        """Whether every pair and every cable's place in the cone is as asked."""
-        least, cone = math.radians(self.min_angle_deg), math.radians(self.max_cone_deg)
-        pairs = pairwise_angles(directions)
-        return bool(np.all(pairs > least) and np.all(-directions[:, 2] > math.cos(cone)))
+    def _keeps_cone(self, directions: Array) -> bool:
+        return bool(np.all(-directions[:, 2] > math.cos(math.radians(self.max_cone_deg))))
+
+    def keeps_pairs(self, team: Team, directions: Array) -> bool:
+        """Whether every pair of cables (n, 3) is as far apart as asked, in degrees and in metres."""
+        angles, _ = self.pair_angles(team)
+        if np.any(pairwise_angles(directions) <= angles[np.triu_indices(team.n, k=1)]):
+            return False
+        if not self.ellipsoids(team):
+            return True
+        sizes = self.drone_distances(team)
+        drones, _ = self.distances(team, directions)
+        return bool(np.all(drones > 0.5 * (sizes[:, None] + sizes[None, :])))
+
+    def distances(self, team: Team, directions: Array) -> tuple[Array, Array]:
+        """Of wanted drones from each other, in the ellipsoid's norm, and from each other's cables (..., n, n), m."""
+        return distance.distances(team.cable_lengths, directions, self.downwash)
 
     def tension_caps(self, team: Team) -> Vector:
         """Largest tension of each cable (n,), N."""
@@ -439,6 +467,7 @@ class Safe(AllocatorPart):
     def params(self, team: Team) -> Vector:
         n = team.n
         angles, causes = self.pair_angles(team)
+        angles = np.minimum(angles, distance.WIDEST)
         table = np.triu(np.cos(angles)) + np.tril(causes, -1)
         most = self.thrust_limits(team)
         limited = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
@@ -619,20 +648,32 @@ class SafeAllocator(Allocator):
         cone, most = self._cone, math.radians(self.part.max_cone_deg)
         enough = math.radians(self.part.min_angle_deg + 1.0)
         default = ring(self.n, min(cone, 0.95 * most))
-        if self.n == 1 or float(pairwise_angles(default).min()) >= enough:
+        if self.n == 1:
+            return default
+        angles, _ = self.part.pair_angles(self.team)
+        enough = max(enough, float(angles[np.triu_indices(self.n, k=1)].max()) + math.radians(1.0))
+        metres = self.part.ellipsoids(self.team)
+
+        def wide(formation: Vector, angle: float) -> bool:
+            return angle >= enough and not (
+                metres and not self.part.keeps_pairs(self.team, formation)
+            )
+
+        if wide(default, float(pairwise_angles(default).min())):
             return default
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             candidate, angle = feasible.widest_formation(
-                self.n, cone + share * (0.98 * most - cone), enough=enough
+                self.n, cone + share * (0.98 * most - cone), enough=math.inf if metres else enough
             )
-            if angle >= enough:
+            if wide(candidate, angle):
                 break
         return candidate
 
     def _gap(self) -> Vector:
         """In the start's cone if that has room, else in a wider one."""
         most = 0.98 * math.radians(self.part.max_cone_deg)
-        enough = math.cos(math.radians(self.part.min_angle_deg + 1.0))
+        angles, _ = self.part.pair_angles(self.team)
+        enough = math.cos(float(angles.max()) + math.radians(1.0))
         narrow = min(self._cone, most)
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             cable = widest_gap(self._directions, narrow + share * (most - narrow))

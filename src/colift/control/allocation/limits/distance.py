@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 
 ANGLE, DRONES, CABLE = 64.0, 128.0, 256.0
 """Bits of :attr:`~colift.control.allocation.base.Allocation.active_limits`: what limits a pair."""
-LEAST_CAP = math.cos(math.radians(150.0))
-"""Least cosine that a pair is asked for; distances that ask for less cannot be kept, and are refused before."""
+WIDEST = math.radians(150.0)
+"""Widest angle that a pair is asked for, rad; distances that ask for more are refused before."""
 
 
 class Apart(NamedTuple):
@@ -121,7 +121,7 @@ def near_ellipsoids(n, m, reach, delta, kappa, sure, slack, firm, start, apart, 
     As :func:`colift.control.allocation.limits.cycle.near_pairs` does with angles; the number of rows with these.
     """
     alpha, pairs, first = work.alpha, work.pairs, work.first
-    length, flat = apart.length, apart.flat
+    length = apart.length
     for i in range(n):
         x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
         for j in range(i):
@@ -315,9 +315,7 @@ def angles_of(lengths: Array, sizes: Array, clearances: Array, least: float) -> 
     cos_cable = np.where(near > 0.0, cos_cable, np.inf)
     cos_cable = np.minimum(cos_cable, cos_cable.T)
     cosines = np.minimum(cos_drones, cos_cable)
-    angles = np.where(
-        cosines < math.cos(least), np.arccos(np.clip(cosines, LEAST_CAP, 1.0)), least
-    )
+    angles = np.where(cosines < math.cos(least), np.arccos(np.clip(cosines, -1.0, 1.0)), least)
     causes = np.where(cos_cable < cos_drones, CABLE, DRONES)
     return angles, np.where(cosines < math.cos(least), causes, ANGLE)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.control.allocation.limits import distance
 from colift.control.allocation.limits.heaviest import Limits, best_tensions, extreme
 from colift.control.allocation.limits.hover import hover_conflicts
 from colift.errors import SettingError
@@ -358,6 +359,7 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
     cone = math.radians(settings.max_cone_deg)
     least = math.radians(settings.min_angle_deg)
     if n > 1:
+        found += _too_far_apart(team, settings)
         angle = packing_bound(n, cone)
         if angle >= least and n <= SEARCHED:
             angle = widest_formation(n, cone, enough=least)[1]
@@ -389,6 +391,50 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
                 f"{settings.max_cone_deg:g} the cables pull {lowest:.4g} N upwards, more than {weight:.4g} N",
             )
         )
+    return found
+
+
+def _too_far_apart(team: Team, settings: Safe) -> list[tuple[str, str]]:
+    """Distances in metres that cables of these lengths cannot keep in their cone."""
+    n, cone = team.n, math.radians(settings.max_cone_deg)
+    by_team = settings.by_team(team)
+    found = []
+
+    def tell(name: str, values: Array, why: str) -> None:
+        path = "drones.radius" if name in by_team else name
+        one = f"{values[0]:.4g}" if np.all(values == values[0]) else f"up to {values.max():.4g}"
+        what = f"{name} = {one} m{', which follows from it,' if name in by_team else ''}"
+        found.append((path, f"{what} conflicts with {why}"))
+
+    clear, lengths = settings.cable_distances(team), team.cable_lengths
+    short = np.flatnonzero(clear >= lengths)
+    if short.size:
+        i = int(short[0])
+        why = f"drones.cable_length: the others' cables end on the load, {lengths[i]:.4g} m from drone {i}"
+        tell("cable_distance", clear, why)
+        return found
+    angles, causes = settings.asked_angles(team)
+    pairs = np.triu_indices(n, k=1)
+    asked = angles[pairs]
+    names = {distance.DRONES: "min_distance", distance.CABLE: "cable_distance"}
+    values = {"min_distance": settings.drone_distances(team), "cable_distance": clear}
+    if not np.any(causes[pairs] != distance.ANGLE):
+        return found
+    most = packing_bound(n, cone)
+    if most >= asked.min() and n <= SEARCHED:
+        most = widest_formation(n, cone, enough=float(asked.min()))[1]
+    crowded = most < asked.min()
+    k = int(np.argmin(asked) if crowded else np.argmax(asked))
+    most = most if crowded else min(2.0 * cone, distance.WIDEST)
+    i, j = int(pairs[0][k]), int(pairs[1][k])
+    if asked[k] > most and causes[i, j] in names:
+        name = names[float(causes[i, j])]
+        why = (
+            f"max_cone_deg = {settings.max_cone_deg:g}: on cables of {lengths[i]:.4g} and {lengths[j]:.4g} m it asks for "
+            f"{math.degrees(asked[k]):.1f} degrees or more, and {n if crowded else 2} cables in that cone are at most "
+            f"{math.degrees(most):.1f} degrees apart"
+        )
+        tell(name, values[name], why)
     return found
 
 
