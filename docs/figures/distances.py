@@ -1,6 +1,6 @@
 """Least distances under attack (docs/theory/safe.md): ``python docs/figures/distances.py [--fly]``.
 
-From ``distances.json`` beside this file. With ``--fly`` it is measured first, half an hour: a million cycles for each team, a
+From ``distances.json`` beside this file. With ``--fly`` it is measured first, some minutes: a million cycles for each team, a
 fifth of them for each family of forces, and a tenth of that without the distances.
 """
 
