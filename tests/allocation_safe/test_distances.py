@@ -9,6 +9,13 @@ import pytest
 
 from colift.control.allocation.base import Status
 from colift.control.allocation.limits import cycle, distance, newton
+from colift.control.allocation.limits.feasibility import (
+    cannot_hold,
+    feasibility,
+    formations,
+    limits_of,
+)
+from colift.control.allocation.limits.heaviest import extreme
 from colift.control.allocation.safe import Safe, SafeAllocator
 from colift.errors import SettingError
 from colift.team import Team
@@ -415,3 +422,40 @@ def test_memory_is_enough_for_every_row() -> None:
         assert allocator.allocate(force).status in (
             Status.CONVERGED, Status.FORCE_REDUCED, Status.ITERATION_LIMIT,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"min_distance": 0.8, "downwash": 1.0},
+        {"min_distance": 0.6},
+        {"cable_distance": 0.3},
+        {"min_distance": 0.5, "cable_distance": 0.25},
+    ],
+)
+@pytest.mark.parametrize("lengths", [[1.0] * 4, [0.6, 1.2, 0.6, 1.2], [0.6, 1.0, 1.4, 0.8, 1.2]])
+def test_what_is_feasible_keeps_the_distances_and_names_what_they_cost(lengths, settings) -> None:
+    team = team_of(lengths)
+    plain = Safe(min_angle_deg=15.0)
+    part = plain.model_copy(update=settings)
+    limits = limits_of(team, part)
+    starts = formations(team.n, limits)
+    assert len(starts)
+    best = extreme(limits, starts)
+    drones, cables = part.distances(team, best.directions)
+    assert drones.min() >= part.drone_distances(team)[0] - 1e-9
+    assert cables.min() >= part.cable_distances(team)[0] - 1e-9
+    assert part.keeps_pairs(team, best.directions)
+    free, found = feasibility(team, plain), feasibility(team, part)
+    assert found.ok
+    assert found.heaviest >= best.weight * (1.0 - 1e-9)
+    assert found.heaviest < free.heaviest
+    named = {b.path.removeprefix("allocation.") for b in found.binding}
+    assert named & {*settings}
+    # The allocator itself, asked for far more, gives no more than that, and nearly that.
+    allocator = settled(team, part)
+    for _ in range(300):
+        answer = allocator.allocate([0.0, 0.0, 1.5 * free.heaviest])
+    held = -float(answer.tensions @ answer.directions[:, 2])
+    assert 0.85 * found.heaviest < held <= 1.02 * found.heaviest
+    assert cannot_hold(team, part, np.full(team.n, np.inf), answer.directions) == []

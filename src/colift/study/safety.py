@@ -167,7 +167,7 @@ def problem(n: int) -> tuple[Team, Safe]:
 
 CABLES = (1.0, 0.6, 1.4, 0.8, 1.2)
 """Lengths of the cables where distances are asked for, in turn, m."""
-CLEARANCE = 0.12
+CLEARANCE = 0.2
 """Distance from others' cables that is asked for then, m."""
 
 
