@@ -61,6 +61,8 @@ class Feasibility:
         Its tensions, N.
     thrusts, thrust_limits : (n,) array
         Thrust that each drone needs in it, and the most that it can give, N (inf where nothing limits it).
+    drone_distances, cable_distances : (n, n) array
+        Of the drones from each other in it, with heights counted as parts of ``downwash``, and of drone i from cable j, m.
 
     """
 
@@ -76,6 +78,8 @@ class Feasibility:
     tensions: Array
     thrusts: Array
     thrust_limits: Array
+    drone_distances: Array
+    cable_distances: Array
 
 
 @dataclass(frozen=True)
@@ -175,6 +179,7 @@ def feasibility(
         if "allocation" in found and binding:
             found["allocation"] += f"; what limits: {', '.join(map(str, binding))}"
         conflicts = list(found.values())
+    drones, cables = settings.distances(team, hover.directions)
     return Feasibility(
         ok=not conflicts,
         lightest=lightest,
@@ -191,6 +196,8 @@ def feasibility(
         tensions=hover.tensions,
         thrusts=team.hover_thrusts(hover.tensions, hover.directions),
         thrust_limits=limits.thrust,
+        drone_distances=drones,
+        cable_distances=cables,
     )
 
 
