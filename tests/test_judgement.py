@@ -131,6 +131,16 @@ def test_means_are_over_time_and_not_over_rows() -> None:
     assert math.isnan(found["min_angle_deg"])
 
 
+def test_distances_are_those_on_the_flights_own_cables(flight: Recording) -> None:
+    flown, judged = flight.mission.team.cable_lengths, judge(flight, ("safe",))
+    for each in judged.answers:
+        at = -flown[:, None] * each.directions
+        one, other = np.triu_indices(flight.n, k=1)
+        near = np.linalg.norm(at[:, one] - at[:, other], axis=-1).min()
+        assert each.numbers["min_drone_distance_m"] == pytest.approx(near)
+        assert 0.0 < each.numbers["min_cable_distance_m"] <= near + 1e-12
+
+
 def test_findings_leave_out_who_drops_force(flight: Recording) -> None:
     judged = judge(flight, ("safe", "ring"))
     cheat = replace(judged.answers[2], allocator="cheat", tensions=0.5 * judged.answers[2].tensions)

@@ -36,6 +36,20 @@ def test_the_force_is_balanced_in_every_smooth_or_noisy_cycle(n: int, family: st
     assert found.unflagged_imbalance == 0
 
 
+@pytest.mark.parametrize("family", safety.FAMILIES)
+@pytest.mark.parametrize("n", [2, 3, 4, 6, 8])
+def test_every_distance_holds_in_every_cycle(n: int, family: str) -> None:
+    ours, angles = (
+        safety.attack(n, family, 2_000, part, metres=True) for part in safety.metric_parts(n)
+    )
+    assert ours.drone_room >= 0.0
+    assert ours.cable_room >= 0.0
+    assert ours.holds
+    if family == "adversary":
+        assert angles.drone_room < -0.02  # the same forces without these limits
+        assert not angles.holds
+
+
 @pytest.mark.parametrize("n", [4, 8])
 def test_the_papers_allocator_breaks_the_limit_under_the_same_forces(n: int) -> None:
     mu = safety.problem(n)[1].mu
@@ -114,4 +128,6 @@ def test_commands_print_one_object_and_tell_by_exit_code() -> None:
     assert shown.returncode == 0, shown.stderr
     result = json.loads(shown.stdout)
     assert len(result["attacks"]) == 2 * len(safety.FAMILIES)
+    assert len(result["distances"]) == 2 * len(safety.FAMILIES)
+    assert all(found["holds"] for found in result["distances"][::2])
     assert len(result["flights"]) == 2 * len(safety.FLIGHTS)

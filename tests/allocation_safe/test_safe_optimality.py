@@ -23,7 +23,7 @@ def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
     i, j = np.triu_indices(team.n, 1)
     rho, delta = part.settling / allocator.dt, part.max_rate * allocator.dt
     least = math.radians(part.min_angle_deg)
-    edge = math.cos(least + max(part._reach(team.n), 2 * delta))
+    edge = math.cos(least + max(part._reach(team.n, least), 2 * delta))
     fade = np.clip(((before @ before.T)[i, j] - edge) / (math.cos(least) - edge), 0.0, 1.0)
     kappa_pair = part.spread * (fade * (2.0 - fade)) ** 2
     thrust = team.masses[:, None] / sigma * (acceleration + [0, 0, team.gravity]) - w

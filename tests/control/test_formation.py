@@ -159,11 +159,11 @@ def test_forces_are_bounded_and_do_not_wind_up():
 @pytest.mark.parametrize("n", [1, 3])
 def test_every_vehicle_holds_a_load_with_gains_of_its_own(vehicle, n):
     """Only the vehicle, the cables and the load are given; motors, noise and 20 ms of delay."""
-    mass = Vehicle.named(vehicle).mass
+    mass, radius = Vehicle.named(vehicle).mass, Team.uniform(1, vehicle=vehicle).radii[0]
     allocation = {"mu_scaling": "weight"} | ({"max_rate": 1.0} if n == 1 else {"max_rate": 0.2})
     flight = fly(
         n,
-        drones={"vehicle": vehicle, "count": n, "cable_length": 1.5},
+        drones={"vehicle": vehicle, "count": n, "cable_length": float(np.fmax(1.5, 3.5 * radius))},
         load={"mass": 0.3 * mass},
         truth={"load_mass_factor": 1.2},
         timing={"duration": 20.0, "delay": 0.02, **PERIODS},

@@ -174,7 +174,8 @@ def test_numbers_that_the_motors_say_are_the_drones_too():
 def test_a_vehicle_feeds_motors_allocator_and_drag(name):
     vehicle = Vehicle.named(name)
     load = 0.2 * vehicle.mass
-    found = mission({"vehicle": name}, **{"load.mass": load, "disturbance": [{"kind": "drag"}]})
+    drones = {"vehicle": name, "cable_length": 5.0}  # so long that the largest keep apart
+    found = mission(drones, **{"load.mass": load, "disturbance": [{"kind": "drag"}]})
     team, motors, safe = found.team, found.actuation, found.allocation
     assert np.all(team.masses == vehicle.mass)
     assert 4.0 * motors.max_thrust == pytest.approx(vehicle.max_thrust)
@@ -405,7 +406,7 @@ def test_a_team_that_cannot_hold_its_load_is_refused_by_the_drones_number():
         assert found.path == "drones.max_thrust"
         assert found.value == "34.2"
     unplanned = {"allocation.max_thrust": 34.2, "allocation.tension_max": 30.0}
-    near = mission({"vehicle": "x500"}, **{"load.mass": 4.2, **unplanned})
+    near = mission({"vehicle": "x500", "cable_length": 2.0}, **{"load.mass": 4.2, **unplanned})
     warned = [each for each in warnings_of(near) if "of thrust to spare" in each.message]
     assert [(each.path, each.value) for each in warned] == [("drones.max_thrust", "34.2")]
 

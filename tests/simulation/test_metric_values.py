@@ -79,6 +79,8 @@ EXPECTED = {
     "usual_angle_deg": neighbour_angle(40.0),
     "min_desired_angle_deg": neighbour_angle(30.0),
     "min_drone_distance_m": 2.0 * math.sin(math.radians(0.5 * neighbour_angle(35.0))),
+    "min_downwash_distance_m": 2.0
+    * math.sin(math.radians(0.5 * neighbour_angle(35.0))),  # all at one height
     "min_cable_distance_m": math.sin(math.radians(neighbour_angle(35.0))),
     "max_tilt_deg": 25.0,
     "peak_thrust_fraction": 0.5,

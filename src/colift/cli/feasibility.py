@@ -25,9 +25,13 @@ from colift.cli.base import (
 from colift.errors import ColiftError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from colift.control.allocation.limits.feasibility import Feasibility
     from colift.control.allocation.safe import Safe
     from colift.mission.mission import Mission
+    from colift.team import Team
 
 
 @app.command()
@@ -106,9 +110,29 @@ def _emit(
             "most_cables_found": found.most_cables[0], "most_cables_bound": found.most_cables[1],
             "tensions_N": found.tensions.tolist(), "thrusts_N": found.thrusts.tolist(),
             "thrust_limits_N": found.thrust_limits.tolist(), "wind": _wind(mission),
+            "drone_distance_m": _least(found.drone_distances), "cable_distance_m": _least(found.cable_distances),
             "notes": notes, "warnings": warnings,
         }
     )  # fmt: skip
+
+
+def _least(distances: NDArray[np.float64]) -> float | None:
+    """The smallest of a table, m; None where there is but one drone."""
+    return float(distances.min()) if distances.size > 1 else None
+
+
+def _distances(team: Team, part: Safe, found: Feasibility) -> str:
+    """In words, how far apart the drones of the formation are where that is limited; empty where it is not."""
+    asked, clear = part.drone_distances(team).max(), part.cable_distances(team).max()
+    words = []
+    if team.n > 1 and asked > 0.0:
+        counted = f", heights counted 1/{part.downwash:g}" if part.downwash > 1.0 else ""
+        words.append(
+            f"drones are {found.drone_distances.min():.3g} m apart{counted} ({asked:.3g} m are asked for)"
+        )
+    if team.n > 1 and clear > 0.0:
+        words.append(f"{found.cable_distances.min():.3g} m from others' cables ({clear:.3g} m)")
+    return f"In the allocator's formation {' and '.join(words)}." if words else ""
 
 
 def _say(mission: Mission, part: Safe, found: Feasibility) -> None:
@@ -133,6 +157,9 @@ def _say(mission: Mission, part: Safe, found: Feasibility) -> None:
         )
     else:
         out.print("Nothing limits the drones' thrust (actuation, allocation.max_thrust).")
+    team = mission.team.of(mission.first_drones())
+    if text := _distances(team, part, found):
+        out.print(text, highlight=False)
     most, bound = found.most_cables
     allowed = f"{most} cables (found; never more than {bound})"
     if most >= SEARCHED:

@@ -34,7 +34,7 @@ def safety(
     """Attack the safe allocator and fly it, beside the paper's allocator.
 
     Alone: smooth, noisy, stepping and adversarial forces; every answer is checked against every
-    limit. In flight: from rest, with a drone below the load, fast, heavy, after losing a drone, for
+    limit, and again with least distances in metres on unequal cables. In flight: from rest, with a drone below the load, fast, heavy, after losing a drone, for
     an hour. The table says where it holds and where not.
     """
     counts = numbers(sizes, 2, 64)

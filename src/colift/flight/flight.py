@@ -24,8 +24,9 @@ from colift.mission.mission import Mission
 from colift.mission.schema import Event
 from colift.mission.warnings import warnings_of
 from colift.part import LAYERS, Part, Vector, make
+from colift.record.ends import ends_of
 from colift.record.recording import Recording
-from colift.team import Team
+from colift.team import Team, contact
 from colift.team.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.wording import numbers
 from colift.world.disturbance.base import DisturbancePart
@@ -122,7 +123,8 @@ class Flight:
     def run(self, progress: Progress | None = None) -> Recording:
         """Fly from where we are to the end of the mission.
 
-        A flight whose numbers stop being finite ends there; the recording says so in ``outcome``.
+        A flight whose numbers stop being finite, or in which drones, cables and load touch, ends there; the recording
+        says so in ``outcome``.
         """
         steps = self.mission.timing.steps
         chunk = max(1, round(CHUNK / self._every.step))
@@ -374,7 +376,10 @@ class Flight:
                 self._apply(self._due.pop(0)[1])
             self._advance(min(stop, self._due[0][0]) if self._due else stop)
             leg = self._legs[-1]
-            if not np.isfinite(leg.bus.row).all():
+            touched = self._first_contact()
+            if touched is not None:
+                self._cut(*touched)
+            elif not np.isfinite(leg.bus.row).all():
                 self.outcome = f"diverged before t = {self.time:g} s"
             elif not leg.bus.carrying.all():
                 lost = self.membership.judged_lost(leg.drones, leg.bus.carrying, self.time)
@@ -405,6 +410,47 @@ class Flight:
         cycles = cycles[: due_rows(self._step, reached, every.allocation)]
         leg.stretches.append(Stretch(self._step, reached, log, cycles))
         self._step = reached
+
+    def _first_contact(self) -> tuple[int, str] | None:
+        """Step and words of the first contact that the last stretch recorded; of drones whose radii are known."""
+        leg = self._legs[-1]
+        team = self.mission.true_team.of(leg.drones)
+        if not contact.watched(team.radii):
+            return None
+        (first, _, log, _), where, period = (
+            leg.stretches[-1],
+            columns(team.n),
+            self._every.recording,
+        )
+        positions = log[:, where["positions"]].reshape(len(log), team.n, 3)
+        load = log[:, where["load"]].reshape(len(log), 2, 3)
+        found = contact.first_contact(
+            team.radii,
+            team.cable_lengths,
+            positions,
+            ends_of(load, team.n)[:, :, 0],
+            log[:, where["attached"]],
+        )
+        if found is None:
+            return None
+        row, text = found
+        return (-(-first // period) + row) * period, text.format(*leg.drones)
+
+    def _cut(self, step: int, text: str) -> None:
+        """End the flight at a step of the last stretch, whose later rows are dropped."""
+        leg, every = self._legs[-1], self._every
+        first, _, log, cycles = leg.stretches.pop()
+        stop = step + 1
+        leg.stretches.append(
+            Stretch(
+                first,
+                stop,
+                log[: due_rows(first, stop, every.recording)],
+                cycles[: due_rows(first, stop, every.allocation)],
+            )
+        )
+        self._step = stop
+        self.outcome = f"{text} at t = {step * every.step:g} s"
 
     def _apply(self, due: Event | Change) -> None:
         """Let an event or a fault happen, now."""

@@ -19,6 +19,7 @@ from colift.mission.criteria import METRICS
 from colift.mission.forecast import forecast
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
+from colift.team import contact
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
@@ -83,7 +84,7 @@ def cross_checks(
             for field, message in found:
                 yield Problem(placed(path, field), _of_drones(frame, field), message)
         if must_fly and not weak:
-            yield from _start_checks(frame, parts, broken)
+            yield from list(_touching(frame, broken)) or _start_checks(frame, parts, broken)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
             for field, message in part.check_timing(timing.step, timing.duration):
@@ -145,6 +146,31 @@ def _start_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             field = "cone_deg" if given is None else "directions"
             value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
             yield Problem(f"start.{field}", value, message)
+
+
+def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
+    """Drones that touch each other, a cable or the load before anything moves."""
+    given = frame.start.directions
+    count = frame.drones.count
+    if "start" in broken or (given is not None and len(given) != count):
+        return
+    drones = frame.first_drones()
+    team = frame.team.of(drones)
+    if not contact.watched(team.radii):
+        return
+    positions = -team.cable_lengths[:, None] * frame.start_directions()
+    found = contact.first_contact(
+        team.radii,
+        team.cable_lengths,
+        positions[None],
+        np.zeros((1, team.n, 3)),
+        np.ones((1, team.n)),
+    )
+    if found is not None:
+        field = "cone_deg" if given is None else "directions"
+        value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
+        message = f"must leave the drones (drones.radius) apart: {found[1].format(*drones)}"
+        yield Problem(f"start.{field}", value, message.replace("touched", "touch"))
 
 
 def hover_checks(

@@ -286,6 +286,8 @@ PAPER_CONE, WIDEST_START = math.radians(35.0), math.radians(65.0)
 """Half-angles of the ring of a start that says none: the paper's, and the most, rad."""
 APART = math.radians(33.0)
 """Angle between neighbours of such a ring, rad: a little more than the allocator's least."""
+ROOM = 1.3
+"""Half of the distance between them, in radii of the drones where these are known: a little more, too."""
 
 
 class Start(Section):
@@ -293,7 +295,7 @@ class Start(Section):
 
     cone_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
     """Half-angle of the ring that the drones start on, degrees. None: 35 (the paper's, see the errata); where that brings
-    neighbours nearer than 33 degrees, so much more, up to 65."""
+    neighbours nearer than 33 degrees or 2.6 ``drones.radius``, so much more, up to 65."""
     heading_deg: float = 0.0
     """Azimuth of the first drone, degrees."""
     directions: list[Point] | None = None
@@ -470,7 +472,10 @@ class Frame(Section):
         """Half-angle of the ring that the drones start on, rad."""
         if self.start.cone_deg is not None:
             return math.radians(self.start.cone_deg)
-        return max(PAPER_CONE, min(ring_cone(len(self.first_drones()), APART), WIDEST_START))
+        team = self.team.of(self.first_drones())
+        reach = np.nan_to_num(ROOM * team.radii / team.cable_lengths).max()
+        apart = max(APART, 2.0 * math.asin(min(float(reach), 1.0)))
+        return max(PAPER_CONE, min(ring_cone(team.n, apart), WIDEST_START))
 
     def start_directions(self) -> Array:
         """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""

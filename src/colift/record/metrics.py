@@ -147,9 +147,8 @@ def _pairs_in_slices(rows: int, n: int) -> Iterator[slice]:
     return (slice(k, k + size) for k in range(0, rows, size))
 
 
-@_metric
-def min_drone_distance_m(r: Recording) -> float:
-    positions = r["positions"]
+def _nearest_drones(positions: NDArray[np.float64]) -> float:
+    """Smallest distance of two drones in (rows, n, 3), m."""
     one, other = np.triu_indices(positions.shape[1], k=1)
     if not len(one):
         return float("nan")
@@ -158,6 +157,19 @@ def min_drone_distance_m(r: Recording) -> float:
         for part in _pairs_in_slices(len(positions), positions.shape[1])
     ]
     return -_largest(-np.concatenate(near))
+
+
+@_metric
+def min_drone_distance_m(r: Recording) -> float:
+    return _nearest_drones(r["positions"])
+
+
+@_metric
+def min_downwash_distance_m(r: Recording) -> float:
+    downwash = r.mission.resolved().get("allocation", {}).get("downwash")
+    if downwash is None:  # nothing is asked for above each other
+        return float("nan")
+    return _nearest_drones(r["positions"] / [1.0, 1.0, float(downwash)])
 
 
 @_metric

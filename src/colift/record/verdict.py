@@ -129,8 +129,13 @@ def criteria_of(mission: Described) -> dict[str, Bound]:
     return {**{name: bound for name, bound in default.items() if name not in own}, **own}
 
 
-_ASKED = {"min_angle_deg": "min_angle_deg", "min_drone_distance_m": "min_distance"}
-"""Settings of an allocator that ask for separation, by the metric that shows it."""
+_ASKED = {
+    "min_angle_deg": "min_angle_deg",
+    "min_drone_distance_m": "min_distance",
+    "min_downwash_distance_m": "min_distance",
+    "min_cable_distance_m": "cable_distance",
+}
+"""Settings of an allocator that ask for separation, by the metric that shows it; what follows from the drones' radii asks for none."""
 
 
 def _least_asked(mission: Described, setting: str) -> float | None:
@@ -142,7 +147,7 @@ def _least_asked(mission: Described, setting: str) -> float | None:
         elif event.field in {"allocation", "allocation.kind"}:
             table = event.value if isinstance(event.value, dict) else {}
             asked.append(table.get(setting))
-    return None if None in asked else min(map(float, asked))
+    return None if None in asked else min(float(np.min(each)) for each in asked)
 
 
 def judge(recording: Recording, values: Mapping[str, float]) -> Verdict:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,8 @@ ANGLE_TOLERANCE = 0.1
 """By how much a wanted angle may fall short of the limit, degrees."""
 BALANCE_TOLERANCE = 1e-8
 """Error of the force balance that must be told by the status, N."""
+DISTANCE_TOLERANCE = 1e-9
+"""By how much a distance may fall short of its limit, m: rounding."""
 AVOIDABLE = 1e-3
 """Largest share of cycles that may miss part of a force that is not proved to be out of reach."""
 ACTUAL_MARGIN = 3.0
@@ -123,7 +125,8 @@ class Attack:
 
     ``limits_broken_by`` is the worst excess over any other limit, N for tensions and rad for cone and turn.
     ``yield_share`` of the cycles do not give the whole force; ``avoidable_share`` are those of them whose
-    force is not *proved* to be out of reach, see :mod:`colift.control.allocation.limits.reach`.
+    force is not *proved* to be out of reach, see :mod:`colift.control.allocation.limits.reach`. ``drone_room`` and ``cable_room``
+    are the smallest distances less their limits, m; None where none are asked for.
     """
 
     n: int
@@ -139,6 +142,8 @@ class Attack:
     not_finite: int
     median_us: float
     p99_us: float
+    drone_room: float | None = None
+    cable_room: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -146,6 +151,7 @@ class Attack:
         return (
             self.smallest_angle >= self.least_angle - ANGLE_TOLERANCE
             and self.limits_broken_by <= 1e-6
+            and min(self.drone_room or 0.0, self.cable_room or 0.0) >= -DISTANCE_TOLERANCE
             and self.unflagged_imbalance == 0
             and self.avoidable_share <= AVOIDABLE
             and self.not_finite == 0
@@ -157,6 +163,31 @@ def problem(n: int) -> tuple[Team, Safe]:
     size = max(n, PAPER_DRONES)
     team = Team.uniform(n, load_mass=scaled_load(size))
     return team, Safe(mu=scaled_mu(size), min_angle_deg=LEAST_ANGLES.get(n, 30.0)).filled(team)
+
+
+CABLES = (1.0, 0.6, 1.4, 0.8, 1.2)
+"""Lengths of the cables where distances are asked for, in turn, m."""
+CLEARANCE = 0.2
+"""Distance from others' cables that is asked for then, m."""
+
+
+def metric_problem(n: int) -> tuple[Team, Safe]:
+    """The same with cables of :data:`CABLES` and distances in metres, for which the angle leaves room: half of it is asked for.
+
+    On equal cables of 1 m the distance would be nine tenths of the chord of the other problem's angle.
+    """
+    team, safe = problem(n)
+    team = replace(team, cable_lengths=np.resize(CABLES, n))
+    apart = 0.9 * 2.0 * math.sin(0.5 * math.radians(safe.min_angle_deg))
+    angle = 0.5 * safe.min_angle_deg
+    changes = {"min_distance": apart, "cable_distance": CLEARANCE, "min_angle_deg": angle}
+    return team, safe.model_copy(update=changes)
+
+
+def metric_parts(n: int) -> tuple[Safe, Safe]:
+    """The allocator of :func:`metric_problem`, and the same without its distances."""
+    safe = metric_problem(n)[1]
+    return safe, safe.model_copy(update={"min_distance": 0.0, "cable_distance": 0.0})
 
 
 class Answers(NamedTuple):
@@ -180,14 +211,26 @@ class Answers(NamedTuple):
 
 
 def answers(
-    n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0, period: float = PERIOD
+    n: int,
+    family: str,
+    cycles: int,
+    part: AllocatorPart,
+    *,
+    seed: int = 0,
+    period: float = PERIOD,
+    metres: bool = False,
 ) -> Iterator[Answers]:
-    """Send one seeded family of forces through one allocator, called every ``period`` (s)."""
-    team, limits = problem(n)
+    """Send one seeded family of forces through one allocator, called every ``period`` (s).
+
+    ``metres``: of the team that is asked for distances, after it has been led to within them in hover.
+    """
+    team, limits = metric_problem(n) if metres else problem(n)
     rng = np.random.default_rng([seed, n, list(FAMILIES).index(family)])
     least = math.radians(limits.min_angle_deg + 1.0)
     cone = math.radians(CONES.get(n, 70.0))
     directions = np.ascontiguousarray(spread_formation(n, cone, least))
+    if metres:
+        directions = np.ascontiguousarray(part.hover(team, directions, period).directions)
     tensions, info = np.zeros(n), np.zeros(INFO_SIZE)
     params, memory = part.params(team), part.memory(team)
     every = round(period / PERIOD)
@@ -208,9 +251,12 @@ def answers(
         yield Answers(forces, before, out[:, 2 : 2 + n], alpha, out[:, 0], out[:, 1] / 1e3)
 
 
-def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0) -> Attack:
-    """Send one seeded family of forces through one allocator and judge every answer."""
-    team, limits = problem(n)[0], problem(n)[1]
+def attack(
+    n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int = 0, metres: bool = False
+) -> Attack:
+    """Send one seeded family of forces through one allocator and judge every answer; ``metres``: distances too."""
+    team, limits = metric_problem(n) if metres else problem(n)
+    rooms = np.full(2, np.inf)
     lowest, highest = limits.tension_floors(team), limits.tension_caps(team)
     turn = limits.turn_rate(team) * PERIOD
     smallest, broken, unflagged, yields, avoidable, bad = 180.0, 0.0, 0, 0, 0, 0
@@ -222,10 +268,12 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
         math.radians(limits.max_cone_deg),
     )
     flagged = [int(s) for s in Status if not s.ok]
-    for found in answers(n, family, cycles, part, seed=seed):
+    for found in answers(n, family, cycles, part, seed=seed, metres=metres):
         T, alpha, previous = found.tensions, found.directions, found.before
         bad += int(np.count_nonzero(~(np.isfinite(T).all(1) & np.isfinite(alpha).all((1, 2)))))
         smallest = min(smallest, float(np.degrees(pairwise_angles(alpha).min())))
+        if metres:
+            rooms = np.minimum(rooms, _rooms(team, limits, alpha))
         chord = np.linalg.norm(alpha - previous, axis=2)
         turned = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
         over = (
@@ -257,7 +305,23 @@ def attack(n: int, family: str, cycles: int, part: AllocatorPart, *, seed: int =
         not_finite=bad,
         median_us=float(np.median(microseconds)),
         p99_us=float(np.percentile(microseconds, 99)),
+        drone_room=float(rooms[0]) if metres else None,
+        cable_room=float(rooms[1]) if metres else None,
     )
+
+
+def _rooms(team: Team, limits: Safe, directions: Array) -> Array:
+    """Smallest distance (2,) of two drones, and of a drone from another's cable, less its limit, m, in answers (k, n, 3)."""
+    least = np.full(2, np.inf)
+    asked = limits.drone_distances(team)
+    apart = 0.5 * (asked[:, None] + asked[None, :])
+    clear = limits.cable_distances(team)[:, None]
+    rows = max(1, 200_000 // team.n**2)  # memory grows with the pairs
+    for begin in range(0, len(directions), rows):
+        drones, cables = limits.distances(team, directions[begin : begin + rows])
+        found = [np.min(drones - apart), np.min(cables - clear)]
+        least = np.minimum(least, found)
+    return least
 
 
 BELOW = [[0.5, 0.0, -0.8], [-0.3, 0.5, -0.8], [-0.3, -0.5, -0.8], [0.3, 0.1, 0.8]]
@@ -351,7 +415,7 @@ def show_all(
     sizes: list[int], cycles: int, *, quick: bool = False, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Every attack and every flight, as plain data with verdicts."""
-    jobs = len(sizes) * len(FAMILIES) + len(FLIGHTS)
+    jobs = 2 * len(sizes) * len(FAMILIES) + len(FLIGHTS)
     done = 0
 
     def tick() -> None:
@@ -360,7 +424,7 @@ def show_all(
         if progress is not None:
             progress(done / jobs)
 
-    attacks, flights = [], []
+    attacks, metric, flights = [], [], []
     for n in sizes:
         team, safe = problem(n)
         for family in FAMILIES:
@@ -368,13 +432,19 @@ def show_all(
                 found = attack(n, family, cycles, part)
                 attacks.append({**asdict(found), "holds": found.holds})
             tick()
+    for n in sizes:
+        for family in FAMILIES:
+            for part in metric_parts(n):
+                found = attack(n, family, cycles, part, metres=True)
+                metric.append({**asdict(found), "holds": found.holds})
+            tick()
     for title in FLIGHTS:
         ours, paper = (fly(title, name, quick=quick) for name in ("safe", "sqp"))
         for flown in (ours, paper):
             verdict = {"survives": flown.survives, "separated": flown.separated}
             flights.append({**asdict(flown), **verdict, "verdict": _verdict(ours, paper)})
         tick()
-    return {"cycles": cycles, "attacks": attacks, "flights": flights}
+    return {"cycles": cycles, "attacks": attacks, "distances": metric, "flights": flights}
 
 
 def _verdict(ours: Flown, paper: Flown) -> str:
@@ -432,6 +502,31 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[s
         ],
         rows,
     )
+    rows = [
+        [
+            str(ours["n"]),
+            ours["family"],
+            *(
+                f"{1e3 * found[room]:.0f}"
+                for room in ("drone_room", "cable_room")
+                for found in (ours, angles)
+            ),
+            _percent(ours["yield_share"], ours["cycles"]),
+            _percent(ours["avoidable_share"], ours["cycles"]),
+            *(f"{found['median_us']:.1f} / {found['p99_us']:.1f}" for found in (ours, angles)),
+            "holds" if ours["holds"] else "BROKEN",
+        ]
+        for ours, angles in zip(result["distances"][::2], result["distances"][1::2], strict=True)
+    ]
+    yield (
+        "With least distances, cables of 0.6 to 1.4 m: smallest distance of drones from each other (taller ellipsoids) and from "
+        "others' cables less its limit, mm, with and without them",
+        [
+            "n", "forces", "drones", "angles only", "cables", "angles only", "yield %", "avoid %", "median / p99",
+            "angles only", "limits",
+        ],
+        rows,
+    )  # fmt: skip
     rows = [
         [
             f["title"],

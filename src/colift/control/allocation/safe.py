@@ -23,7 +23,7 @@ from colift.control.allocation.base import (
     Status,
 )
 from colift.control.allocation.common.oracle import paper_objective
-from colift.control.allocation.limits import cycle, newton
+from colift.control.allocation.limits import cycle, distance, newton, recovery
 from colift.control.allocation.limits import feasibility as feasible
 from colift.control.allocation.paper import newton as paper
 from colift.errors import Problem, SettingError
@@ -40,18 +40,18 @@ _INVALID_FORCE = int(Status.INVALID_FORCE)
 _FORCE_REDUCED = int(Status.FORCE_REDUCED)
 _RECOVERING = int(Status.RECOVERING)
 """Where ``info`` has a sixth place: which kinds of limits push, one bit each in the order of
-:mod:`colift.control.allocation.limits.newton`; 64 stands for the pairs."""
+:mod:`colift.control.allocation.limits.newton`; of pairs 64 stands for the angle, 128 for the distance of drones, 256 for that from a cable."""
 
 MEMORY = Layout(
     team={"S": newton.SYSTEM, "lam": 3, "M": 6, "facing": 3, "yielded": 1, "asked": 3},
     drone={
         "data": newton.DATA, "T": 1, "alpha": 3, "start": 3, "w": 3, "dw": 3, "w_new": 3,
-        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1,
+        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1, "length": 1, "size": 1,
     },
 )  # fmt: skip
 """In columns; those of every limit, of every pair, and the matrix ``K`` follow. A team that changes starts anew."""
 LIMIT = Layout(drone={"g": 1, "g_new": 1, "z": 1})
-PAIR = Layout(drone={"kappa": 1, "cos_max": 1, "both": 2})
+PAIR = Layout(drone={"kappa": 1, "cos_max": 1, "both": 2, "cause": 1, "root": 1})
 MASK = 0xFFFFF
 """No team has more drones: so told, the compiler knows that no index along the team is negative."""
 C, L, N, P = MEMORY.at, LIMIT.at, PAIR.at, cycle.PARAMS.at
@@ -65,7 +65,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     tensions, directions = writes.desired_tensions, writes.desired_directions
     info = writes.allocator_info
     n = tensions.shape[0] & MASK
-    most = n * (n - 1) // 2
+    most = n * (n - 1)  # angle and ellipsoid of every pair
     count = newton.LIMITS * n + most
     limits = C.rows + C.width * n
     near = limits + L.width * count
@@ -83,6 +83,9 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         pairs=column(memory, near, most, PAIRS.both),
         kappa_pair=column(memory, near, most, PAIRS.kappa),
         cos_max=column(memory, near, most, PAIRS.cos_max),
+        cause=column(memory, near, most, PAIRS.cause),
+        root=column(memory, near, most, PAIRS.root),
+        flat=params[P.flat],
         first=column(memory, C.rows, n, CABLES.first),
         rows=column(memory, C.rows, n, CABLES.row),
         K=memory[square : square + 4 * n * n],
@@ -124,8 +127,23 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     rho = params[P.settling] / period
 
     cycle.sort_cables(n, directions, order)
+    table = P.rows + P.width * n
+    apart = distance.Apart(
+        capped=params[P.capped] != 0.0,
+        stacked=params[P.stacked] != 0.0,
+        flat=params[P.flat],
+        table=params[table : table + n * n],
+        length=column(memory, C.rows, n, CABLES.length),
+        size=column(memory, C.rows, n, CABLES.size),
+        order=order,
+    )
+    if apart.stacked:
+        for i in range(n):
+            row = P.rows + P.width * int(order[i])
+            apart.length[i] = params[row + P.length]
+            apart.size[i] = params[row + P.size]
     relaxed = cycle.set_up(
-        n, order, W, unit, delta, acceleration, tensions, directions, params, start, work
+        n, order, W, unit, delta, acceleration, tensions, directions, params, start, apart, work
     )
     if W > 1e-6 and not relaxed:
         follow = period / (params[P.turning] + period)
@@ -133,7 +151,14 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     edge = params[P.cos_edge]
     if 2.0 * delta > params[P.reach]:
         edge = math.cos(min(params[P.min_angle] + 2.0 * delta, math.pi))
-    m = cycle.near_pairs(n, params[P.cos_angle], edge, params[P.kappa_pair], start, work)
+    m = caps = cycle.near_pairs(
+        n, params[P.cos_angle], edge, params[P.kappa_pair], start, apart, work
+    )
+    if apart.stacked:
+        m = distance.near_ellipsoids(
+            n, m, params[P.reach], delta, params[P.kappa_pair], recovery.SURE, recovery.ROOM, recovery.FIRM,
+            start, apart, work,
+        )  # fmt: skip
     heavy = max(1.0, abs(fz) / n)
     leaning = 0.0
     if yielded[0] > 0.0:
@@ -153,8 +178,8 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         tolerance=params[P.tolerance],
         max_iterations=int(params[P.iterations]),
     )
-    outcome = cycle.iterate(n, kinds, m, task, work, info)
-    info[INFO_ACTIVE] = cycle.active_limits(n, kinds, m, work.z)
+    outcome = cycle.iterate(n, kinds, caps, m, task, work, info)
+    info[INFO_ACTIVE] = cycle.active_limits(n, kinds, m, work.cause, work.z)
     squares = M[0] * M[0] + M[3] * M[3] + M[5] * M[5]
     squares += 2.0 * (M[1] * M[1] + M[2] * M[2] + M[4] * M[4])
     J = 0.5 * mu * (squares - n)
@@ -176,7 +201,10 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
     reduced = balance > 1e-8 * max(1.0, sigma)
     yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
-    if relaxed and cycle.breaks_a_limit(n, order, unit, params, work):
+    if relaxed and cycle.breaks_a_limit(n, order, unit, params, apart, work):
+        if apart.capped or apart.stacked:
+            bits = distance.broken(n, apart, recovery.ROUNDING, alpha)
+            info[INFO_ACTIVE] = float(int(info[INFO_ACTIVE]) | bits)
         return _RECOVERING
     if reduced:
         return _FORCE_REDUCED
@@ -187,6 +215,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
 
 Degrees = Annotated[float, Field(gt=0.0, lt=90.0)]
 Force = Annotated[float, Field(gt=0.0, le=1e6)]
+Distance = Annotated[float, Field(ge=0.0, le=1e3)]
 
 RATE_BARRIER = 1.0
 """Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
@@ -202,6 +231,8 @@ RATE, SWINGING = 0.15, 1.0
 """Fastest turn of cables of 1 m, rad/s, which drones with real motors can follow; of one or two cables, on which a load swings."""
 ANY = 1e6
 """Force that nothing limits, N."""
+CLEAR = 1.2
+"""Distance that a drone keeps from all others' middle and cables where no limit is given, in its radii."""
 RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
 
@@ -217,7 +248,9 @@ class Safe(AllocatorPart):
 
     kernel = _allocate
     spread_setting = ("mu", (0.05, 0.15, 0.4, 0.75, 1.35))
-    per_drone = ("tension_min", "tension_max", "max_thrust", "weights")
+    per_drone = (
+        "tension_min", "tension_max", "max_thrust", "weights", "min_distance", "cable_distance",
+    )  # fmt: skip
     of_all = ("tension_min", "tension_max", "mu", "mu_force", "max_rate")
     from_team: ClassVar[Mapping[str, float | None]] = {
         "tension_min": 0.05,
@@ -226,6 +259,8 @@ class Safe(AllocatorPart):
         "mu": 0.15,
         "mu_force": 2.20725,
         "max_rate": 6.0,
+        "min_distance": 0.0,
+        "cable_distance": 0.0,
     }
 
     mu: Annotated[float, Field(ge=0.0)] | None = None
@@ -239,6 +274,14 @@ class Safe(AllocatorPart):
     the paper's load."""
     min_angle_deg: Annotated[float, Field(gt=0.0, lt=150.0)] = 30.0
     """Least angle between any two cables, degrees."""
+    min_distance: Distance | list[Distance] | None = None
+    """Least distance between the centres of two drones, m; one value, or one per drone: two keep the mean of theirs. 0: not
+    limited. None: 2.4 of ``drones.radius`` where that is known, else 0."""
+    downwash: Annotated[float, Field(ge=1.0, le=10.0)] = 2.0
+    """How much more of ``min_distance`` drones keep above each other than beside each other."""
+    cable_distance: Distance | list[Distance] | None = None
+    """Least distance of a drone's centre from the others' cables, m; one value, or one per drone. 0: not limited. None: 1.2 of
+    ``drones.radius`` where that is known, else 0."""
     tension_min: Force | list[Force] | None = None
     """Least tension, N; one value, or one per cable. None: half of a cable's share of the load's weight where
     ``drones.max_thrust`` is known, else 0.05."""
@@ -286,6 +329,11 @@ class Safe(AllocatorPart):
     def check(self, team: Team) -> list[tuple[str, str]]:
         return self.wrong_lengths(team.n) or self._crossed(team)
 
+    def asked_angles(self, team: Team) -> tuple[Array, Array]:
+        """As :meth:`pair_angles`, with ellipsoids as the spheres within them: what no formation can do without."""
+        sizes, least = self.drone_distances(team), math.radians(self.min_angle_deg)
+        return distance.angles_of(team.cable_lengths, sizes, self.cable_distances(team), least)
+
     def _crossed(self, team: Team) -> list[tuple[str, str]]:
         """A given limit of the tension beyond the other, which is left to the team."""
         low, high = self.settled("tension_min", team), self.settled("tension_max", team)
@@ -312,6 +360,8 @@ class Safe(AllocatorPart):
             "tension_min": np.where(known, LOW * share, math.nan),
             "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), math.nan),
             "max_thrust": MOST * team.max_thrusts,
+            "min_distance": 2.0 * CLEAR * team.radii,
+            "cable_distance": CLEAR * team.radii,
         }
 
     def filled(self, team: Team) -> Safe:
@@ -376,7 +426,7 @@ class Safe(AllocatorPart):
         return self.settled("max_thrust", team)
 
     def cannot_start(self, team: Team, directions: Array) -> str:
-        if self._keeps_limits(directions):
+        if self.keeps_pairs(team, directions) and self._keeps_cone(directions):
             return ""
         allocator = SafeAllocator.unchecked(team, self)
         allocator.reset(directions)
@@ -385,6 +435,15 @@ class Safe(AllocatorPart):
             if answer.status is not Status.RECOVERING:
                 return ""
         polar = np.arccos(np.clip(-answer.directions[:, 2], -1.0, 1.0))
+        drones, cables = self.distances(team, answer.directions)
+        metres = "".join(
+            f", {name} = {np.max(asked):g} m where {np.min(found):.3g} m would be left"
+            for name, asked, found in (
+                ("min_distance", self.drone_distances(team), drones),
+                ("cable_distance", self.cable_distances(team), cables),
+            )
+            if np.any(asked > 0.0) and team.n > 1
+        )
         apart, widest = (
             f"{math.degrees(angle):.1f} degrees"
             for angle in (
@@ -395,16 +454,28 @@ class Safe(AllocatorPart):
         return (
             f"breaks a limit and cannot be led back: after {RECOVERY:g} s of hover the {team.n} cables would "
             f"be {apart} apart and up to {math.degrees(polar.max()):.1f} degrees from the vertical "
-            f"(allocation.min_angle_deg = {self.min_angle_deg:g}, max_cone_deg = {self.max_cone_deg:g}; "
+            f"(allocation.min_angle_deg = {self.min_angle_deg:g}, max_cone_deg = {self.max_cone_deg:g}{metres}; "
             f"the widest formation in that cone has {widest}): start within the limits, with "
             "start.directions where one ring is too narrow, or ask for less"
         )
 
-    def _keeps_limits(self, directions: Array) -> bool:
-        """Whether every pair and every cable's place in the cone is as asked."""
-        least, cone = math.radians(self.min_angle_deg), math.radians(self.max_cone_deg)
-        pairs = pairwise_angles(directions)
-        return bool(np.all(pairs > least) and np.all(-directions[:, 2] > math.cos(cone)))
+    def _keeps_cone(self, directions: Array) -> bool:
+        return bool(np.all(-directions[:, 2] > math.cos(math.radians(self.max_cone_deg))))
+
+    def keeps_pairs(self, team: Team, directions: Array) -> bool:
+        """Whether every pair of cables (n, 3) is as far apart as asked, in degrees and in metres."""
+        angles, _ = self.pair_angles(team)
+        if np.any(pairwise_angles(directions) <= angles[np.triu_indices(team.n, k=1)]):
+            return False
+        if not self.ellipsoids(team):
+            return True
+        sizes = self.drone_distances(team)
+        drones, _ = self.distances(team, directions)
+        return bool(np.all(drones > 0.5 * (sizes[:, None] + sizes[None, :])))
+
+    def distances(self, team: Team, directions: Array) -> tuple[Array, Array]:
+        """Of wanted drones from each other, in the ellipsoid's norm, and from each other's cables (..., n, n), m."""
+        return distance.distances(team.cable_lengths, directions, self.downwash)
 
     def tension_caps(self, team: Team) -> Vector:
         """Largest tension of each cable (n,), N."""
@@ -414,14 +485,49 @@ class Safe(AllocatorPart):
         """Least tension of each cable (n,), N."""
         return self.settled("tension_min", team)
 
+    def drone_distances(self, team: Team) -> Vector:
+        """Least distance of each drone (n,), m: two keep the mean of theirs; 0: not limited."""
+        return self.settled("min_distance", team)
+
+    def cable_distances(self, team: Team) -> Vector:
+        """Least distance of each drone (n,) from the others' cables, m; 0: not limited."""
+        return self.settled("cable_distance", team)
+
+    def pair_angles(self, team: Team) -> tuple[Array, Array]:
+        """Least angle of every pair (n, n), rad, with what distances ask for, and the bit of the limit that asks for it.
+
+        Without the ellipsoids, which are no angles (:meth:`ellipsoids`).
+        """
+        sizes = self.drone_distances(team) if self.downwash == 1.0 else np.zeros(team.n)
+        return distance.angles_of(
+            team.cable_lengths, sizes, self.cable_distances(team), math.radians(self.min_angle_deg)
+        )
+
+    def ellipsoids(self, team: Team) -> bool:
+        """Whether ellipsoids about the drones limit more than the angles do already."""
+        sizes = self.drone_distances(team)
+        if self.downwash == 1.0 or team.n < 2 or not sizes.any():
+            return False
+        a, b = team.cable_lengths[:, None], team.cable_lengths[None, :]
+        angles, _ = self.pair_angles(team)
+        near = np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(angles)) / self.downwash
+        pairs = np.triu_indices(team.n, k=1)
+        return bool(np.any(near[pairs] < 0.5 * (sizes[:, None] + sizes[None, :])[pairs]))
+
     def params(self, team: Team) -> Vector:
         n = team.n
+        angles, causes = self.pair_angles(team)
+        angles = np.minimum(angles, distance.WIDEST)
+        table = np.triu(np.cos(angles)) + np.tril(causes, -1)
         most = self.thrust_limits(team)
         limited = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
         weights = self._relative_weights(n)
-        least, reach = math.radians(self.min_angle_deg), self._reach(n)
+        least = math.radians(self.min_angle_deg)
+        if n > 1:
+            least = float(angles[np.triu_indices(n, k=1)].max())
+        reach = self._reach(n, least)
         cone, tilt = math.radians(self.max_cone_deg), math.radians(self.max_tilt_deg or 89.0)
-        return cycle.PARAMS.pack(
+        packed = cycle.PARAMS.pack(
             n,
             mu=self.penalty(team),
             mu_scaled=self._scaled(team),
@@ -454,7 +560,13 @@ class Safe(AllocatorPart):
             T_max=self.tension_caps(team),
             m=team.masses,
             f_max=np.minimum(most, 1e6),
+            capped=bool(np.any(causes != distance.ANGLE)),
+            stacked=self.ellipsoids(team),
+            flat=1.0 / self.downwash**2,
+            length=team.cable_lengths,
+            size=self.drone_distances(team),
         )
+        return np.concatenate([packed, table.ravel()])
 
     def _relative_weights(self, n: int) -> Vector:
         """Weight of each cable (n,) relative to their mean; ones, exactly, where all are the same."""
@@ -462,15 +574,15 @@ class Safe(AllocatorPart):
         weights /= weights.max()
         return np.asarray(weights / weights.mean())
 
-    def _reach(self, n: int) -> float:
-        """Distance beyond the least angle at which a pair is seen, rad: about the second neighbours."""
-        cone, least = math.radians(self.max_cone_deg), math.radians(self.min_angle_deg)
+    def _reach(self, n: int, least: float) -> float:
+        """Distance beyond the least angle (rad) at which a pair is seen, rad: about the second neighbours."""
+        cone = math.radians(self.max_cone_deg)
         spacing = math.sqrt(1.15 * 2.0 * math.pi * (1.0 - math.cos(cone)) / n)
         return min(max(1.8 * spacing - least, 0.3 * least), math.radians(60.0))
 
     def memory(self, team: Team) -> Vector:
         n = team.n
-        pairs = n * (n - 1) // 2
+        pairs = n * (n - 1)
         limits = newton.LIMITS * n + pairs
         return np.zeros(MEMORY.size(n) + LIMIT.size(limits) + PAIR.size(pairs) + 4 * n * n)
 
@@ -503,6 +615,9 @@ class _Further(TypedDict, total=False):
     barrier: float
     tolerance: float
     max_iterations: int
+    min_distance: float | list[float] | None
+    downwash: float
+    cable_distance: float | list[float] | None
 
 
 class SafeSettings(_Further, total=False):
@@ -591,20 +706,32 @@ class SafeAllocator(Allocator):
         cone, most = self._cone, math.radians(self.part.max_cone_deg)
         enough = math.radians(self.part.min_angle_deg + 1.0)
         default = ring(self.n, min(cone, 0.95 * most))
-        if self.n == 1 or float(pairwise_angles(default).min()) >= enough:
+        if self.n == 1:
+            return default
+        angles, _ = self.part.pair_angles(self.team)
+        enough = max(enough, float(angles[np.triu_indices(self.n, k=1)].max()) + math.radians(1.0))
+        metres = self.part.ellipsoids(self.team)
+
+        def wide(formation: Vector, angle: float) -> bool:
+            return angle >= enough and not (
+                metres and not self.part.keeps_pairs(self.team, formation)
+            )
+
+        if wide(default, float(pairwise_angles(default).min())):
             return default
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             candidate, angle = feasible.widest_formation(
-                self.n, cone + share * (0.98 * most - cone), enough=enough
+                self.n, cone + share * (0.98 * most - cone), enough=math.inf if metres else enough
             )
-            if angle >= enough:
+            if wide(candidate, angle):
                 break
         return candidate
 
     def _gap(self) -> Vector:
         """In the start's cone if that has room, else in a wider one."""
         most = 0.98 * math.radians(self.part.max_cone_deg)
-        enough = math.cos(math.radians(self.part.min_angle_deg + 1.0))
+        angles, _ = self.part.pair_angles(self.team)
+        enough = math.cos(float(angles.max()) + math.radians(1.0))
         narrow = min(self._cone, most)
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             cable = widest_gap(self._directions, narrow + share * (most - narrow))

@@ -15,6 +15,7 @@ four cables, and is as far from collapse, for every n.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from colift.control.allocation.base import Allocator, AllocatorPart, Status
+from colift.control.allocation.limits.distance import distances
 from colift.errors import ColiftError, MissionError, Problem
 from colift.flight.flight import Progress
 from colift.part import answering, find
@@ -42,6 +44,8 @@ Array = NDArray[np.float64]
 PAPER = Team.uniform(4)
 ON_BOARD, ACTUAL = "on board", "actual"
 """Rows that no allocator of ours made: what was wanted in flight, and what the cables did."""
+PAIRED = 200_000
+"""Pairs of cables whose distances are computed at a time."""
 WARM_UP = 20
 """Calls before the clock counts."""
 
@@ -57,6 +61,8 @@ class Quantity:
 
 QUANTITIES = {
     "min_angle_deg": Quantity("angle", "deg", "smallest angle between two cables at any time"),
+    "min_drone_distance_m": Quantity("drones", "m", "smallest distance of two drones on such cables at any time"),
+    "min_cable_distance_m": Quantity("cable", "m", "smallest distance of a drone from another's cable at any time"),
     "tension_ratio": Quantity("T/F", "1", "mean sum of tensions over mean force"),
     "mean_total_tension_N": Quantity("mean T", "N", "time average of the sum of tensions"),
     "peak_total_tension_N": Quantity("peak T", "N", "largest simultaneous sum of tensions"),
@@ -68,7 +74,7 @@ QUANTITIES = {
     "median_us": Quantity("median", "us", "median duration of an allocation"),
     "p99_us": Quantity("99 %", "us", "99th percentile of the duration"),
     "max_us": Quantity("worst", "us", "longest allocation"),
-}
+}  # fmt: skip
 """Every number of a row, by name; NaN where it does not apply."""
 
 
@@ -84,6 +90,8 @@ class Answers:
     directions: Array
     statuses: tuple[Status, ...] = ()
     durations: Array | None = None
+    lengths: Array | None = None
+    """Of the flight's cables (n,), m."""
 
     @cached_property
     def smallest_angles(self) -> Array:
@@ -92,6 +100,19 @@ class Answers:
         if not angles.shape[1]:
             return np.full(len(angles), np.nan)
         return np.asarray(np.degrees(angles.min(axis=1)))
+
+    @cached_property
+    def nearest(self) -> tuple[float, float]:
+        """Smallest distance of two drones, and of a drone from another's cable, m; NaN where they are not known."""
+        n = self.directions.shape[1]
+        if self.lengths is None or n < 2:
+            return math.nan, math.nan
+        least = np.full(2, np.inf)
+        size = max(1, PAIRED // n**2)
+        for begin in range(0, len(self.directions), size):
+            found = distances(self.lengths, self.directions[begin : begin + size])
+            least = np.minimum(least, [np.nanmin(each, initial=np.inf) for each in found])
+        return float(least[0]), float(least[1])
 
     @cached_property
     def numbers(self) -> dict[str, float]:
@@ -107,6 +128,8 @@ class Answers:
         mean_total = float(mean(total, self.time))
         found = {
             "min_angle_deg": _extreme(self.smallest_angles, np.min),
+            "min_drone_distance_m": self.nearest[0],
+            "min_cable_distance_m": self.nearest[1],
             "tension_ratio": mean_total
             / float(mean(np.linalg.norm(self.force, axis=1), self.time)),
             "mean_total_tension_N": mean_total,
@@ -252,15 +275,16 @@ def judge(
     if len(time) < 2 or not force.any():
         raise ColiftError(f"{name}: holds no force commands to judge by")
     team, scale = twin(recording.mission.team, float(mean(np.linalg.norm(force, axis=1), time)))
-    whole = recording.complete()
+    whole, lengths = recording.complete(), recording.mission.team.cable_lengths
     names = ("desired_tensions", "desired_directions", "tensions", "directions")
     arrays = {key: whole[key][rows] for key in names}
     answers = [
         Answers(
-            ON_BOARD, {}, time, force, arrays["desired_tensions"], arrays["desired_directions"]
+            ON_BOARD, {}, time, force, arrays["desired_tensions"], arrays["desired_directions"],
+            lengths=lengths,
         ),
-        Answers(ACTUAL, {}, time, force, arrays["tensions"], arrays["directions"]),
-    ]
+        Answers(ACTUAL, {}, time, force, arrays["tensions"], arrays["directions"], lengths=lengths),
+    ]  # fmt: skip
     for k, (kind, part) in enumerate(parts_for(recording.n, kinds, settings).items()):
         if conflicts := part.check(team) + part.conflicts(team):
             raise ColiftError(
@@ -271,7 +295,8 @@ def judge(
             if progress is not None:
                 progress((begin + done) / len(kinds))
 
-        answers.append(ask(kind, part, team, scale, time, force, arrays["directions"][0], tick))
+        asked = ask(kind, part, team, scale, time, force, arrays["directions"][0], tick)
+        answers.append(replace(asked, lengths=lengths))
     return Judged(name, recording.n, scale, tuple(answers))
 
 
@@ -290,6 +315,9 @@ def twin(team: Team, mean_force: float) -> tuple[Team, float]:
         inertias=scale * longer**2 * team.inertias,
         max_thrusts=scale * team.max_thrusts,
         cable_lengths=longer * team.cable_lengths,
+        arms=longer * team.arms,
+        radii=longer * team.radii,
+        rotor_radii=longer * team.rotor_radii,
     ), scale
 
 

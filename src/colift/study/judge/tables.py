@@ -94,7 +94,8 @@ def summary(judged: Sequence[Judged]) -> Tables:
 
 
 NOTE = (
-    "angle: smallest between two cables, degrees; < 30: flights with less than 30; T/F: mean sum of tensions "
+    "angle: smallest between two cables, degrees; drones, cable: smallest distance of two drones, and of a drone from another's "
+    "cable, cm; < 30: flights with less than 30; T/F: mean sum of tensions "
     "over mean force; peak T: largest sum of tensions, N; turn: RMS rate of the directions, degrees/s; left: "
     "RMS force left out, mN; not ok: allocations not CONVERGED, %; times of one allocation, us."
 )
@@ -110,6 +111,8 @@ def flight_tables(judgement: Judged) -> Tables:
             [
                 a.allocator,
                 shown(v["min_angle_deg"], 1),
+                shown(100.0 * v["min_drone_distance_m"], 0),
+                shown(100.0 * v["min_cable_distance_m"], 0),
                 shown(v["tension_ratio"], 3),
                 shown(v["peak_total_tension_N"], 3),
                 shown(v["turn_rms_deg_s"], 0),
@@ -122,7 +125,18 @@ def flight_tables(judgement: Judged) -> Tables:
             times = [shown(v[q], 1) for q in ("median_us", "p99_us", "max_us")]
             counts = ", ".join(f"{name} {count}" for name, count in a.status_counts.items())
             work.append([a.allocator, *times, counts])
-    header = ["allocator", "angle", "T/F", "peak T", "turn", "largest", "left", "largest"]
+    header = [
+        "allocator",
+        "angle",
+        "drones",
+        "cable",
+        "T/F",
+        "peak T",
+        "turn",
+        "largest",
+        "left",
+        "largest",
+    ]
     yield f"{judgement.flight}: {judgement.n} drones, {duration:.1f} s", header, quality
     yield "Time of one allocation", ["allocator", "median", "99 %", "worst", "statuses"], work
 

@@ -5,7 +5,9 @@ violated configuration back (:mod:`colift.control.allocation.limits.recovery`), 
 
 Pairs. A direction turns by at most ``delta`` per cycle, so only pairs closer than ``min_angle + 2 delta``
 can come too close in this cycle. Those within ``min_angle + reach`` are listed, and the weight of their
-barrier fades to zero at that distance, so that nothing jumps when a pair enters or leaves.
+barrier fades to zero at that distance, so that nothing jumps when a pair enters or leaves. Where drones are to keep distances
+(:mod:`colift.control.allocation.limits.distance`) ``min_angle`` is the widest angle that any pair keeps, and ellipsoids that may touch are
+further rows.
 
 This file imports only the compiler front end and the names of places.
 """
@@ -15,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from colift.control.allocation.limits import newton, recovery
+from colift.control.allocation.limits import distance, newton, recovery
 from colift.control.allocation.paper.newton import rotate
 from colift.kernel.jit import inline
 from colift.kernel.layout import Layout
@@ -26,10 +28,13 @@ PARAMS = Layout(
         "kappa_pair": 1, "min_angle": 1, "reach": 1, "max_rate": 1, "settling": 1, "turning": 1,
         "price": 1, "tolerance": 1, "iterations": 1, "limits": 1, "g": 1, "cone": 1, "tilt": 1,
         "total": 1, "equal": 1, "cos_angle": 1, "cos_edge": 1, "cos_cone": 1, "cos_tilt": 1, "tan_lean": 1,
+        "capped": 1, "stacked": 1, "flat": 1,
     },
-    drone={"weight": 1, "T_min": 1, "T_max": 1, "m": 1, "f_max": 1},
+    drone={"weight": 1, "T_min": 1, "T_max": 1, "m": 1, "f_max": 1, "length": 1, "size": 1},
 )  # fmt: skip
-"""Tensions and the largest thrust in N. ``cos_edge`` is that of ``min_angle + reach``, ``tan_lean`` of ``LEVEL`` of the tilt."""
+"""Tensions and the largest thrust in N. ``cos_edge`` is that of ``min_angle + reach``, ``tan_lean`` of ``LEVEL`` of the tilt.
+
+The rest (n * n) is :attr:`colift.control.allocation.limits.distance.Apart.table`."""
 P = PARAMS.at
 LEVEL = 0.8
 """Part of the largest tilt that a drone needs at most for itself."""
@@ -160,7 +165,7 @@ def turn_home(n, fx, fy, fz, W, follow, most, facing, work):  # type: ignore[no-
 
 @inline
 def set_up(  # type: ignore[no-untyped-def]
-    n, order, W, unit, delta, acceleration, tensions, directions, params, start, work
+    n, order, W, unit, delta, acceleration, tensions, directions, params, start, apart, work
 ):
     """Limits of every cable in this cycle and a strictly feasible ``w``; whether one was relaxed."""
     data, T, alpha, w = work.data, work.T, work.alpha, work.w
@@ -179,9 +184,9 @@ def set_up(  # type: ignore[no-untyped-def]
     for k in range(3 * n):
         alpha[k] = start[k]
     relaxed = False
-    if recovery.is_broken(n, params[P.cos_angle], cos_cone, recovery.SURE, start):
+    if recovery.is_broken(n, params[P.cos_angle], cos_cone, recovery.SURE, apart, start):
         relaxed = True
-        recovery.lead_back(n, params[P.min_angle], params[P.cone], delta, start, alpha)
+        recovery.lead_back(n, params[P.min_angle], params[P.cone], delta, start, apart, alpha)
     for i in range(n):
         d = newton.DATA * i
         p = P.rows + P.width * int(order[i])
@@ -239,11 +244,11 @@ def set_up(  # type: ignore[no-untyped-def]
 
 
 @inline
-def breaks_a_limit(n, order, unit, params, work):  # type: ignore[no-untyped-def]
+def breaks_a_limit(n, order, unit, params, apart, work):  # type: ignore[no-untyped-def]
     """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
     data, T, alpha = work.data, work.T, work.alpha
     cos_angle, cos_cone = params[P.cos_angle], params[P.cos_cone]
-    if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, alpha):
+    if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, apart, alpha):
         return True
     if params[P.limits] > 4.0:
         cos_tilt = params[P.cos_tilt]
@@ -288,10 +293,10 @@ def drone_limits(d, mass, thrust, gravity, cos_tilt, tan_lean, acceleration, dat
 
 
 @inline
-def near_pairs(n, limit, edge, kappa, start, work):  # type: ignore[no-untyped-def]
+def near_pairs(n, limit, edge, kappa, start, apart, work):  # type: ignore[no-untyped-def]
     """List the pairs ``(i, j)``, ``j < i``, closer than where the cosine is ``edge``; their number.
 
-    ``limit`` is that of the least angle.
+    ``limit`` is that of the least angle, the widest of all pairs where each has its own.
 
     ``first[i]`` becomes the first neighbour of cable i: the envelope of the sparse matrix. A pair that
     is too close may not come closer than half of the way that recovery gained.
@@ -314,22 +319,28 @@ def near_pairs(n, limit, edge, kappa, start, work):  # type: ignore[no-untyped-d
                     first[i] = j
                 pairs[2 * m] = i
                 pairs[2 * m + 1] = j
-                fade = min((c - edge) * scale, 1.0)
+                most, slope, cause = limit, scale, distance.ANGLE
+                if apart.capped:
+                    most = distance.cap_of(n, i, j, apart)
+                    slope = 1.0 / (most - edge)
+                    cause = distance.cause_of(n, i, j, apart)
+                fade = min((c - edge) * slope, 1.0)
                 fade *= 2.0 - fade
                 kappa_pair[m] = kappa * fade * fade
-                cos_max[m] = limit
-                if limit - c <= recovery.SURE:
+                cos_max[m] = most
+                work.cause[m] = cause
+                if most - c <= recovery.SURE:
                     old = start[3 * i] * start[3 * j] + start[3 * i + 1] * start[3 * j + 1]
                     old += start[3 * i + 2] * start[3 * j + 2]
-                    cos_max[m] = max(limit, max(0.5 * (old + c), c + recovery.ROOM))
+                    cos_max[m] = max(most, max(0.5 * (old + c), c + recovery.ROOM))
                     kappa_pair[m] = min(kappa_pair[m], recovery.FIRM * (cos_max[m] - c))
                 m += 1
     return m
 
 
 @inline
-def active_limits(n, limits, m, z):  # type: ignore[no-untyped-def]
-    """Bit k is set when a limit of kind k (bit 6: pairs) pushes with more than a tenth of a share."""
+def active_limits(n, limits, m, cause, z):  # type: ignore[no-untyped-def]
+    """Bit k is set when a limit of kind k (a pair's: ``cause``) pushes with more than a tenth of a share."""
     bits = 0
     for i in range(n):
         for k in range(limits):
@@ -337,7 +348,7 @@ def active_limits(n, limits, m, z):  # type: ignore[no-untyped-def]
                 bits |= 1 << k
     for k in range(m):
         if z[newton.LIMITS * n + k] > 0.1:
-            bits |= 64
+            bits |= int(cause[k])
     return float(bits)
 
 
@@ -351,7 +362,7 @@ def slight_cost(n, mu, rho, data):  # type: ignore[no-untyped-def]
 
 
 @inline
-def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
+def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-def]
     """Interior-point iteration from the strictly feasible ``w``; outcome, see the codes above.
 
     Two phases. In the first the objective is the whole cost, and force may be missing at a price.
@@ -365,7 +376,7 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
     price, yielding, leaning, tolerance, max_iterations = task[8:]
     data, kappa_pair, w, w_new = work.data, work.kappa_pair, work.w, work.w_new
     g, g_new, z, S, lam = work.g, work.g_new, work.z, work.S, work.lam
-    newton.margins(n, limits, m, work, w, g)
+    newton.margins(n, limits, caps, m, work, w, g)
     spread_now = spread
     iterations = 0
     waited = 0
@@ -432,7 +443,7 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
         # A full step leaves what it began with times that change, nearly.
         if settled and (again or origin * drift * left <= tolerance):
             known = True
-            residual = newton.gradient(n, limits, m, weights, work)
+            residual = newton.gradient(n, limits, caps, m, weights, work)
             if residual <= tolerance:
                 outcome = CONVERGED
                 break
@@ -445,7 +456,7 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
         else:
             known = again = False
         if not again:
-            newton.assemble(n, limits, m, weights, work)
+            newton.assemble(n, limits, caps, m, weights, work)
             if iterations > 0 and not known:
                 residual = newton.stationarity(n, work)
                 if not fresh and yielding and residual <= tolerance * level:
@@ -485,7 +496,7 @@ def iterate(n, limits, m, task, work, info):  # type: ignore[no-untyped-def]
         lam[0] = S[69]
         lam[1] = S[70]
         lam[2] = S[71]
-        s = longest_step(n, limits, m, work)
+        s = longest_step(n, limits, caps, m, work)
         for k in range(3 * n):
             w[k] = w_new[k]
         drift = 0.0
@@ -531,7 +542,7 @@ def leaning_now(fx, fy, fz, W, delta, yielded, asked):  # type: ignore[no-untype
 
 
 @inline
-def longest_step(n, limits, m, work):  # type: ignore[no-untyped-def]
+def longest_step(n, limits, caps, m, work):  # type: ignore[no-untyped-def]
     """Longest step, at most 1, that leaves every limit the part ``KEEP`` of its margin; 0 if none.
 
     Along a step most limits are concave, so that their secant gives a step that keeps them. Pairs and the least
@@ -548,7 +559,7 @@ def longest_step(n, limits, m, work):  # type: ignore[no-untyped-def]
         else:
             for k in range(3 * n):
                 w_new[k] = w[k] + s * dw[k]
-        newton.margins(n, limits, m, work, w_new, g_new)
+        newton.margins(n, limits, caps, m, work, w_new, g_new)
         if s == 0.0:
             break
         ratio = 1.0

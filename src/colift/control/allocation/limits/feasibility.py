@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.control.allocation.limits import distance
 from colift.control.allocation.limits.heaviest import Limits, best_tensions, extreme
 from colift.control.allocation.limits.hover import hover_conflicts
 from colift.errors import SettingError
@@ -60,6 +61,8 @@ class Feasibility:
         Its tensions, N.
     thrusts, thrust_limits : (n,) array
         Thrust that each drone needs in it, and the most that it can give, N (inf where nothing limits it).
+    drone_distances, cable_distances : (n, n) array
+        Of the drones from each other in it, with heights counted as parts of ``downwash``, and of drone i from cable j, m.
 
     """
 
@@ -75,6 +78,8 @@ class Feasibility:
     tensions: Array
     thrusts: Array
     thrust_limits: Array
+    drone_distances: Array
+    cable_distances: Array
 
 
 @dataclass(frozen=True)
@@ -108,14 +113,30 @@ class Binding:
 def limits_of(team: Team, settings: Safe, thrusts: Array | None = None) -> Limits:
     """The limits of cables and drones; ``thrusts`` (n,): what the drones' motors can give, N."""
     told = settings.thrust_limits(team)
+    least = math.radians(settings.min_angle_deg)
+    metres: dict[str, Any] = {}
+    angles, causes = settings.pair_angles(team)
+    ellipsoids = settings.ellipsoids(team)
+    if ellipsoids or np.any(causes != distance.ANGLE):
+        if team.n > 1:
+            least = float(angles[np.triu_indices(team.n, k=1)].min())
+        sizes = settings.drone_distances(team)
+        metres = {
+            "pairs": angles,
+            "causes": causes,
+            "lengths": team.cable_lengths,
+            "apart": 0.5 * (sizes[:, None] + sizes[None, :]) if ellipsoids else None,
+            "stretch": settings.downwash,
+        }
     return Limits(
         weights=team.masses * team.gravity,
         low=settings.tension_floors(team),
         high=settings.tension_caps(team),
         thrust=told if thrusts is None else np.minimum(told, thrusts),
         cone=math.radians(settings.max_cone_deg),
-        min_angle=math.radians(settings.min_angle_deg),
+        min_angle=least,
         tilt=math.radians(settings.max_tilt_deg or 90.0),
+        **metres,
     )
 
 
@@ -140,18 +161,25 @@ def feasibility(
         conflicts += [message for _, message in actuation.conflicts(team)]
     starts = formations(n, limits)
     if start is None:
-        start = widest_formation(n, limits.cone, enough=limits.min_angle + math.radians(2.0))[0]
+        start = widest_formation(n, limits.cone, enough=limits.widest + math.radians(2.0))[0]
     hover = settings.hover(team, start, dt)
     heaviest, lightest = 0.0, math.nan
     binding: tuple[Binding, ...] = ()
     if len(starts):
         heaviest, binding = _heaviest(team, settings, actuation, limits, starts)
         lightest = extreme(limits, starts, heaviest=False).weight
+        if limits.pairs is not None and team.gravity > 0.0:
+            # Distances leave more corners to end in: the allocator, asked for too much, may know a better formation.
+            asked = replace(team, load_mass=1.2 * max(limits.bound(), weight) / team.gravity)
+            overloaded = settings.hover(asked, start, dt).directions
+            if is_within(limits, overloaded):
+                heaviest = max(heaviest, np.nan_to_num(best_tensions(limits, overloaded)[0]))
     if not conflicts:
         found = hover_conflicts(team, hover, motors)
         if "allocation" in found and binding:
             found["allocation"] += f"; what limits: {', '.join(map(str, binding))}"
         conflicts = list(found.values())
+    drones, cables = settings.distances(team, hover.directions)
     return Feasibility(
         ok=not conflicts,
         lightest=lightest,
@@ -162,12 +190,14 @@ def feasibility(
             float(pairwise_angles(start).min()) if n > 1 else math.pi,
             widest_angle(n, limits.cone),
         ),
-        most_cables=most_cables(limits.min_angle, limits.cone),
+        most_cables=most_cables(math.radians(settings.min_angle_deg), limits.cone),
         conflicts=tuple(conflicts),
         directions=hover.directions,
         tensions=hover.tensions,
         thrusts=team.hover_thrusts(hover.tensions, hover.directions),
         thrust_limits=limits.thrust,
+        drone_distances=drones,
+        cable_distances=cables,
     )
 
 
@@ -202,6 +232,9 @@ def _heaviest(
         if by_drones:
             path, most = "drones.max_thrust", team.max_thrusts
             value = float(most[0]) if np.all(most == most[0]) else most.tolist()
+        elif name.endswith("_distance") and name in part.by_team(team):
+            path, radii = "drones.radius", team.radii
+            value = float(radii[0]) if np.all(radii == radii[0]) else radii.tolist()
         elif name in part.from_team:
             value = part.filled(team).model_dump()[name]
             default = name not in part.model_fields_set or value == part.from_team[name]
@@ -211,7 +244,7 @@ def _heaviest(
             continue
         if path in found:
             price += found[path].price
-        unit = " deg" if name.endswith("_deg") else " N"
+        unit = " deg" if name.endswith("_deg") else " m" if name.endswith("_distance") else " N"
         found[path] = Binding(path, value, unit, default, price)
     return best.weight, tuple(sorted(found.values(), key=lambda each: -abs(each.price)))
 
@@ -256,6 +289,10 @@ def _quickly_held(limits: Limits, weight: float, directions: Array) -> float:
     if n <= POLISHED:
         known = [*(list(_rings(n, limits, 1.15)) or narrow), directions]
         kept = [each for each in known if is_within(limits, each)]
+        if not kept and limits.pairs is not None:
+            kept = list(formations(n, limits)[:QUICK])
+            if not kept:  # which distances allow, if any: it is not known that they do not
+                return limits.bound()
         if np.ptp(limits.ceiling(np.ones(n))) > 0.0:
             kept += [_strongest_inside(limits, each) for each in kept]
         held = extreme(limits, np.array(kept), steps=QUICK, enough=weight).weight if kept else most
@@ -282,6 +319,8 @@ QUICK = 25
 """Steps of that search."""
 FORMATIONS = 24
 """Wide formations from which the heaviest load is looked for."""
+PLACED = 8
+"""Ways to place the drones in a formation, where each pair has an angle of its own."""
 NARROW = (1.05, 1.3)
 """And narrow ones: by which factor their angles exceed the least."""
 
@@ -291,7 +330,7 @@ def _rings(n: int, limits: Limits, wider: float = 1.0) -> Iterator[Array]:
 
     ``wider``: by which factor the angles are.
     """
-    gap = wider * _ROOM * limits.min_angle
+    gap = wider * _ROOM * limits.widest
     for inside in sorted({*range(1, min(n, 6)), n}):
         wide = 0.0 if inside == 1 else math.sin(0.5 * gap) / math.sin(math.pi / inside)
         if wide >= 1.0:
@@ -310,7 +349,9 @@ def _rings(n: int, limits: Limits, wider: float = 1.0) -> Iterator[Array]:
             left -= room
             cone += gap
         if left == 0:
-            yield np.vstack(rings)
+            formation = np.vstack(rings)
+            if limits.apart is None or _keeps_ellipsoids(limits, formation):
+                yield formation
 
 
 _ROOM = 1.0 + 1e-6
@@ -320,12 +361,33 @@ def is_within(limits: Limits, directions: Array) -> bool:
     """Whether directions (n, 3) keep the least angle and the cone."""
     if np.any(-directions[:, 2] < math.cos(limits.cone)):
         return False
-    return len(directions) < 2 or float(pairwise_angles(directions).min()) > limits.min_angle
+    if len(directions) < 2:
+        return True
+    asked: Any = limits.min_angle
+    if limits.pairs is not None:
+        asked = limits.pairs[np.triu_indices(len(directions), k=1)]
+    if np.any(pairwise_angles(directions) <= asked):
+        return False
+    return limits.apart is None or _keeps_ellipsoids(limits, directions)
+
+
+def _keeps_ellipsoids(limits: Limits, directions: Array) -> bool:
+    assert limits.lengths is not None
+    assert limits.apart is not None
+    drones, _ = distance.distances(limits.lengths, directions, limits.stretch)
+    return bool(np.all(drones > _ROOM * limits.apart))
 
 
 def formations(n: int, limits: Limits) -> Array:
     """Formations (k, n, 3) within the limits, to look for the best from: different ones, drones in different places."""
-    found = [each.copy() for each in _spread_formations(n, limits.cone, limits.min_angle)]
+    found = [each.copy() for each in _spread_formations(n, limits.cone, limits.widest)]
+    if (
+        limits.pairs is not None
+    ):  # some pairs ask for less, and drones of short cables want other places
+        found += [each.copy() for each in _spread_formations(n, limits.cone, limits.min_angle)]
+        rng = np.random.default_rng(1)
+        found += [each[rng.permutation(n)] for each in found for _ in range(PLACED)]
+        found = [each for each in found if is_within(limits, each)][:FORMATIONS]
     if not found:
         return np.zeros((0, n, 3))
     rng = np.random.default_rng(0)
@@ -335,7 +397,10 @@ def formations(n: int, limits: Limits) -> Array:
     # Narrow ones too: drones that may hardly tilt, or hardly lift, hold nothing in a wide one.
     narrow = [each for wider in NARROW for each in _rings(n, limits, wider)]
     narrow = [each for each in narrow if is_within(limits, each)]
-    return np.array([*found, *narrow, *(_strongest_inside(limits, each) for each in narrow)])
+    found += [*narrow, *(_strongest_inside(limits, each) for each in narrow)]
+    if limits.pairs is not None:
+        found = [each for each in found if is_within(limits, each)]
+    return np.array(found)
 
 
 @lru_cache(maxsize=64)
@@ -358,6 +423,7 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
     cone = math.radians(settings.max_cone_deg)
     least = math.radians(settings.min_angle_deg)
     if n > 1:
+        found += _too_far_apart(team, settings)
         angle = packing_bound(n, cone)
         if angle >= least and n <= SEARCHED:
             angle = widest_formation(n, cone, enough=least)[1]
@@ -383,6 +449,50 @@ def conflicts_of(team: Team, settings: Safe) -> list[tuple[str, str]]:
                 f"{settings.max_cone_deg:g} the cables pull {lowest:.4g} N upwards, more than {weight:.4g} N",
             )
         )
+    return found
+
+
+def _too_far_apart(team: Team, settings: Safe) -> list[tuple[str, str]]:
+    """Distances in metres that cables of these lengths cannot keep in their cone."""
+    n, cone = team.n, math.radians(settings.max_cone_deg)
+    by_team = settings.by_team(team)
+    found = []
+
+    def tell(name: str, values: Array, why: str) -> None:
+        path = "drones.radius" if name in by_team else name
+        one = f"{values[0]:.4g}" if np.all(values == values[0]) else f"up to {values.max():.4g}"
+        what = f"{name} = {one} m{', which follows from it,' if name in by_team else ''}"
+        found.append((path, f"{what} conflicts with {why}"))
+
+    clear, lengths = settings.cable_distances(team), team.cable_lengths
+    short = np.flatnonzero(clear >= lengths)
+    if short.size:
+        i = int(short[0])
+        why = f"drones.cable_length: the others' cables end on the load, {lengths[i]:.4g} m from drone {i}"
+        tell("cable_distance", clear, why)
+        return found
+    angles, causes = settings.asked_angles(team)
+    pairs = np.triu_indices(n, k=1)
+    asked = angles[pairs]
+    names = {distance.DRONES: "min_distance", distance.CABLE: "cable_distance"}
+    values = {"min_distance": settings.drone_distances(team), "cable_distance": clear}
+    if not np.any(causes[pairs] != distance.ANGLE):
+        return found
+    most = packing_bound(n, cone)
+    if most >= asked.min() and n <= SEARCHED:
+        most = widest_formation(n, cone, enough=float(asked.min()))[1]
+    crowded = most < asked.min()
+    k = int(np.argmin(asked) if crowded else np.argmax(asked))
+    most = most if crowded else min(2.0 * cone, distance.WIDEST)
+    i, j = int(pairs[0][k]), int(pairs[1][k])
+    if asked[k] > most and causes[i, j] in names:
+        name = names[float(causes[i, j])]
+        why = (
+            f"max_cone_deg = {settings.max_cone_deg:g}: on cables of {lengths[i]:.4g} and {lengths[j]:.4g} m it asks for "
+            f"{math.degrees(asked[k]):.1f} degrees or more, and {n if crowded else 2} cables in that cone are at most "
+            f"{math.degrees(most):.1f} degrees apart"
+        )
+        tell(name, values[name], why)
     return found
 
 

@@ -5,7 +5,9 @@ In cable forces ``w_i = T_i alpha_i`` (N, drone to load) the weight ``-sum w_iz`
     max  -sum_i w_iz   such that   sum_i w_ix = sum_i w_iy = 0   and for each cable i and pair (i, j)
     T_min_i <= |w_i| <= T_max_i,   -w_iz >= cos(cone) |w_i|,
     |m_i g e3 - w_i| <= f_i  (thrust),   its angle to the vertical <= tilt,
-    w_i . w_j <= cos(min_angle) |w_i| |w_j|
+    w_i . w_j <= c_ij |w_i| |w_j|,   |S (L_i alpha_i - L_j alpha_j)| >= d_ij
+
+``c_ij`` is that of the least angle or of a distance (:mod:`colift.control.allocation.limits.distance`).
 
 Only the pairs and ``T_min`` are not convex. A primal-dual interior point from several starts at once (a batch, the
 first axis of every array); where a limit curves the wrong way its curvature is left out of the Newton matrix, which
@@ -21,6 +23,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.control.allocation.limits import distance
+
 Array = NDArray[np.float64]
 
 KINDS = (
@@ -30,8 +34,13 @@ KINDS = (
     "max_thrust",
     "max_tilt_deg",
     "min_angle_deg",
+    "min_distance",
+    "cable_distance",
 )
-"""Limits in the order of their margins: five a cable, then the pairs."""
+"""Limits: five a cable, in the order of their margins, then those of the pairs."""
+
+AS_GOOD = 0.02
+"""Difference of the weights, as a share, up to which the prices of another formation serve as well."""
 
 _UP = np.array([0.0, 0.0, 1.0])
 _EYE = np.eye(3)
@@ -50,7 +59,15 @@ class Limits:
     thrust : (n,) array
         Largest thrust of each drone, N; inf where there is none.
     cone, min_angle, tilt : float
-        rad; ``tilt`` pi / 2 where it is not limited.
+        rad; ``tilt`` pi / 2 where it is not limited. ``min_angle`` is the least that any pair is asked for.
+    pairs : (n, n) array, optional
+        Least angle of every pair, rad, where they have their own.
+    causes : (n, n) array, optional
+        Which limit asks for it, as a bit.
+    lengths : (n,) array, optional
+        Of the cables, m, where there are distances.
+    apart : (n, n) array, optional
+        Distances of drones that are no angle, m: in a norm in which heights count less, by ``stretch``.
 
     """
 
@@ -61,6 +78,18 @@ class Limits:
     cone: float
     min_angle: float
     tilt: float = 0.5 * math.pi
+    pairs: Array | None = None
+    causes: Array | None = None
+    lengths: Array | None = None
+    apart: Array | None = None
+    stretch: float = 1.0
+
+    @property
+    def widest(self) -> float:
+        """The largest angle that any pair is asked for, rad."""
+        if self.pairs is None or self.weights.size < 2:
+            return self.min_angle
+        return float(self.pairs[np.triu_indices(self.weights.size, k=1)].max())
 
     def ceiling(self, cosines: Array) -> Array:
         """Largest tension (..., n) of cables at these cosines to the vertical (..., n), N; negative: none."""
@@ -146,12 +175,19 @@ def extreme(
         return none
     weights = np.where(held, -w[:, :, 2].sum(axis=1), -math.inf if heaviest else math.inf)
     best = int(np.argmax(weights) if heaviest else np.argmin(weights))
+    priced = best
+    if limits.pairs is not None:
+        # Where an iteration ends in a corner its multipliers say little: those of another that is nearly as good.
+        near = np.flatnonzero(np.abs(weights - weights[best]) <= AS_GOOD * abs(weights[best]))
+        priced = int(
+            near[np.argmin(problem.residuals(w[near], z[near], -1.0 if heaviest else 1.0))]
+        )
     size = np.linalg.norm(w[best], axis=1)
     return Optimum(
         weight=float(weights[best]) * unit,
         directions=w[best] / size[:, None],
         tensions=size * unit,
-        prices=problem.prices(w[best], z[best], float(weights[best])),
+        prices=problem.prices(w[priced], z[priced], float(weights[priced])),
     )
 
 
@@ -165,10 +201,19 @@ class _Batch:
         self.low, self.high = limits.low / unit, limits.high / unit
         self.thrust = np.where(np.isinf(limits.thrust), 1e6, limits.thrust / unit)
         self.cos_cone, self.cos_tilt = math.cos(limits.cone), math.cos(limits.tilt)
-        self.cos_pair = math.cos(limits.min_angle)
-        self.sin_cone, self.sin_tilt = math.sin(limits.cone), math.sin(limits.tilt)
-        self.sin_pair = math.sin(limits.min_angle)
         self.i, self.j = np.triu_indices(n, k=1)
+        self.angles = np.full(self.i.size, limits.min_angle)
+        if limits.pairs is not None:
+            self.angles = limits.pairs[self.i, self.j]
+        self.causes = np.full(self.i.size, distance.ANGLE)
+        if limits.causes is not None:
+            self.causes = limits.causes[self.i, self.j]
+        self.cos_pair = np.array([math.cos(angle) for angle in self.angles])
+        self.lengths = np.ones(n) if limits.lengths is None else limits.lengths
+        self.unit = self.lengths[self.i] * self.lengths[self.j]
+        self.flat = np.array([1.0, 1.0, 1.0 / limits.stretch**2])
+        self.square = None if limits.apart is None else limits.apart[self.i, self.j] ** 2
+        self.sin_cone, self.sin_tilt = math.sin(limits.cone), math.sin(limits.tilt)
         self.ends = np.zeros((self.i.size, n))  # which two cables are a pair
         self.ends[np.arange(self.i.size), self.i] = self.ends[np.arange(self.i.size), self.j] = 1.0
 
@@ -186,9 +231,17 @@ class _Batch:
                 self.thrust - f,
                 u[:, :, 2] - self.cos_tilt * f,
                 pairs,
+                *self._ellipsoid_margins(alpha),
             ],
             axis=1,
         )
+
+    def _ellipsoid_margins(self, alpha: Array) -> list[Array]:
+        """As of the allocator, see :mod:`colift.control.allocation.limits.distance`."""
+        if self.square is None:
+            return []
+        u = (self.lengths[:, None] * alpha)[:, self.i] - (self.lengths[:, None] * alpha)[:, self.j]
+        return [0.5 * (np.sum(self.flat * u * u, axis=2) - self.square) / self.unit]
 
     def solve(self, w: Array, sign: float, steps: int, enough: float) -> tuple[Array, Array]:
         """Minimise ``sign`` times the weight; the last iterates and their multipliers."""
@@ -244,7 +297,8 @@ class _Batch:
         u = self.own[:, None] * _UP - w
         f = np.maximum(np.linalg.norm(u, axis=2), 1e-12)
         axis = u / f[:, :, None]
-        J = np.zeros((k, 5 * n + i.size, n, 3))
+        rows = 0 if self.square is None else i.size
+        J = np.zeros((k, 5 * n + i.size + rows, n, 3))
         r = np.arange(n)
         J[:, r, r] = -alpha
         J[:, n + r, r] = alpha
@@ -255,10 +309,17 @@ class _Batch:
         pair = 5 * n + np.arange(i.size)
         J[:, pair, i] = -(alpha[:, j] - c * alpha[:, i]) / T[:, i, None]
         J[:, pair, j] = -(alpha[:, i] - c * alpha[:, j]) / T[:, j, None]
+        if self.square is not None:
+            L = self.lengths[:, None]
+            v = self.flat * ((L * alpha)[:, i] - (L * alpha)[:, j]) / self.unit[:, None]
+            for one, sign in ((i, 1.0), (j, -1.0)):
+                slope = sign * v * L[one]
+                along = np.einsum("kpa,kpa->kp", slope, alpha[:, one])[:, :, None]
+                J[:, pair + i.size, one] = (slope - along * alpha[:, one]) / T[:, one, None]
         across = _EYE - alpha[:, :, :, None] * alpha[:, :, None, :]
         turned = _EYE - axis[:, :, :, None] * axis[:, :, None, :]
         zs = z[:, : 5 * n].reshape(k, 5, n)
-        zp = z[:, 5 * n :]
+        zp = z[:, 5 * n : 5 * n + i.size]
         around = zp @ self.ends
         H = np.zeros((k, n, 3, n, 3))
         blocks = ((zs[:, 0] + self.cos_cone * zs[:, 2]) / T + around / T**2)[
@@ -276,10 +337,30 @@ class _Batch:
         across = np.abs(w[:, :, :2].sum(axis=1)).max(axis=1)
         return (self.margins(w).min(axis=1) >= 0.0) & (across < 1e-9 * self.n), w
 
+    def residuals(self, w: Array, z: Array, sign: float) -> Array:
+        """Largest part (k,) of the objective's gradient that neither multipliers nor the horizontal balance explain."""
+        _, J = self._curvature(w, z)
+        left = -sign * _UP - np.einsum("kmx,km->kx", J, z).reshape(w.shape)
+        left[:, :, :2] -= left[:, :, :2].mean(axis=1, keepdims=True)
+        return np.asarray(np.abs(left).max(axis=(1, 2)))
+
     def prices(self, w: Array, z: Array, weight: float) -> dict[str, float]:
         n, T = self.n, np.linalg.norm(w, axis=1)
-        z_pairs = float(z[5 * n :].sum()) if n > 1 else 0.0
-        angle = math.acos(self.cos_pair)
+        # By how much the cosine falls for a small share of the angle, of the drones' distance, of that from a cable.
+        a, b = self.lengths[self.i], self.lengths[self.j]
+        falls = {
+            distance.ANGLE: np.sin(self.angles) * self.angles,
+            distance.DRONES: (a * a + b * b) / self.unit - 2.0 * self.cos_pair,
+            distance.CABLE: np.sin(self.angles) ** 2 / np.maximum(self.cos_pair, 1e-3),
+        }
+        pairs = z[5 * n : 5 * n + self.i.size]
+        by_cause = {
+            cause: float(pairs @ np.where(self.causes == cause, fall, 0.0))
+            for cause, fall in falls.items()
+        }
+        drones = by_cause[distance.DRONES]
+        if self.square is not None:
+            drones += float(z[5 * n + self.i.size :] @ (self.square / self.unit))
         return dict(
             zip(
                 KINDS,
@@ -289,7 +370,9 @@ class _Batch:
                     float(z[2 * n : 3 * n] @ T) * self.sin_cone * math.acos(self.cos_cone) / weight,
                     float(z[3 * n : 4 * n] @ self.thrust) / weight,
                     float(z[4 * n : 5 * n].sum()) / weight,
-                    z_pairs * self.sin_pair * angle / weight,
+                    by_cause[distance.ANGLE] / weight,
+                    drones / weight,
+                    by_cause[distance.CABLE] / weight,
                 ],
                 strict=True,
             )

@@ -14,7 +14,8 @@ with the force, or after recovery has moved those outside a limit) and the thrus
          RATE          a.alpha - cos(delta)            >= 0     delta = max_rate dt
          THRUST        f_max - |p - w|                 >= 0     concave
          TILT          e3.(p - w) - cos(tilt) |p - w|  >= 0     concave
-         PAIR          cos(min_angle) - alpha_i.alpha_j >= 0    not concave
+         PAIR          cos(min_angle) - alpha_i.alpha_j >= 0    not concave; a cosine for each pair where there are distances
+         ELLIPSOID     |S (L_i alpha_i - L_j alpha_j)| >= d     not concave, see :mod:`colift.control.allocation.limits.distance`
 
 Every limit is kept strictly by every iterate: limits hold whenever the iteration is stopped.
 
@@ -41,7 +42,7 @@ on the multiplier, a problem in three unknowns after the elimination. Inside the
 ``E_v >> E_h``, the horizontal part gives way first. When the bounds rise and fall: :func:`colift.control.allocation.limits.cycle.iterate`.
 
 Source: own derivation; interior point as in Nocedal and Wright, Numerical Optimization, ch. 19.
-This file imports only the compiler front end.
+This file imports only the compiler front end and the limits on distances.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
 
 TENSION_MAX, TENSION_MIN, CONE, RATE, THRUST, TILT = range(6)
@@ -91,7 +93,12 @@ class Work(NamedTuple):
     """Cables ``i, j`` of every near pair (2m), ``j < i``."""
     kappa_pair: Any
     cos_max: Any
-    """Barrier of every near pair, and the largest cosine of its angle."""
+    """Barrier of every near pair, and the largest cosine of its angle; or ``q`` of its ellipsoid."""
+    cause: Any
+    root: Any
+    """What limits every near pair, as a bit; of an ellipsoid ``sqrt(L_i / L_j)``."""
+    flat: float
+    """Of ellipsoids, ``1 / stretch^2``."""
     first: Any
     """First near neighbour of every cable."""
     rows: Any
@@ -116,8 +123,8 @@ class Weights(NamedTuple):
 
 
 @inline
-def margins(n, limits, m, work, w, g):  # type: ignore[no-untyped-def]
-    """From ``w``: tensions, directions and the value of every limit, cables first, then pairs."""
+def margins(n, limits, caps, m, work, w, g):  # type: ignore[no-untyped-def]
+    """From ``w``: tensions, directions and the value of every limit, cables first, then pairs, of which ``caps`` are angles."""
     data, T, alpha, pairs, cos_max = work.data, work.T, work.alpha, work.pairs, work.cos_max
     for i in range(n):
         d = DATA * i
@@ -150,16 +157,17 @@ def margins(n, limits, m, work, w, g):  # type: ignore[no-untyped-def]
             g[o + 4] = data[d + F_MAX] - thrust
             g[o + 5] = fz - data[d + COS_TILT] * thrust
     o = LIMITS * n
-    for k in range(m):
+    for k in range(caps):
         i = 3 * int(pairs[2 * k])
         j = 3 * int(pairs[2 * k + 1])
         g[o + k] = cos_max[k] - (
             alpha[i] * alpha[j] + alpha[i + 1] * alpha[j + 1] + alpha[i + 2] * alpha[j + 2]
         )
+    distance.margins(n, caps, m, o, work, g)
 
 
 @inline
-def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
+def assemble(n, limits, caps, m, weights, work):  # type: ignore[no-untyped-def]
     """Gradient and Hessian at ``(T, alpha)``: fills ``rows`` and the pair blocks of ``K``."""
     cost, mu, rho, kappa, kappa_rate = weights
     data, T, alpha, g, z, M = work.data, work.T, work.alpha, work.g, work.z, work.M
@@ -200,7 +208,7 @@ def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
     M[4] = yz
     M[5] = zz
 
-    for k in range(m):
+    for k in range(caps):
         i = int(pairs[2 * k])
         j = int(pairs[2 * k + 1])  # j < i
         oi = ROW * i
@@ -241,6 +249,7 @@ def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
         K[top + 1] = scale * (stiff * ui1 * uj2 + zk * (bi0 * dj0 + bi1 * dj1 + bi2 * dj2))
         K[low] = scale * (stiff * ui2 * uj1 + zk * (di0 * bj0 + di1 * bj1 + di2 * bj2))
         K[low + 1] = scale * (stiff * ui2 * uj2 + zk * (di0 * dj0 + di1 * dj1 + di2 * dj2))
+    distance.assemble(n, caps, m, LIMITS * n, ROW, work)
 
     for i in range(n):
         d = DATA * i
@@ -366,7 +375,7 @@ def assemble(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gradient(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
+def gradient(n, limits, caps, m, weights, work):  # type: ignore[no-untyped-def]
     """Gradient at ``(T, alpha)`` alone, world frame, into ``w_new``; the largest over the cables of the Lagrangian's."""
     cost, mu, rho, kappa, kappa_rate = weights
     data, T, alpha, g, M, lam = work.data, work.T, work.alpha, work.g, work.M, work.lam
@@ -389,7 +398,7 @@ def gradient(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
     M[3] = yy
     M[4] = yz
     M[5] = zz
-    for k in range(m):
+    for k in range(caps):
         i = 3 * int(pairs[2 * k])
         j = 3 * int(pairs[2 * k + 1])
         primal = kappa_pair[k] / g[LIMITS * n + k]
@@ -399,6 +408,7 @@ def gradient(n, limits, m, weights, work):  # type: ignore[no-untyped-def]
         G[j] += primal * alpha[i]
         G[j + 1] += primal * alpha[i + 1]
         G[j + 2] += primal * alpha[i + 2]
+    distance.add_gradient(caps, m, LIMITS * n, work, G)
     lx, ly, lz = lam[0], lam[1], lam[2]
     worst = 0.0
     for i in range(n):

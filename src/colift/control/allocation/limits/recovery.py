@@ -9,13 +9,14 @@ hold up the others.
 
 Coincident cables have no direction to part in: the golden angle gives each its own.
 
-This file imports only the compiler front end.
+This file imports only the compiler front end and the limits on distances.
 """
 
 from __future__ import annotations
 
 import math
 
+from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
 
 BUFFER = 0.02
@@ -44,8 +45,11 @@ def window(n, cosine, alpha):  # type: ignore[no-untyped-def]
 
 
 @inline
-def is_broken(n, cos_angle, cos_cone, margin, alpha):  # type: ignore[no-untyped-def]
-    """Whether any pair or any cable's place in the cone has no more than a margin (cosine)."""
+def is_broken(n, cos_angle, cos_cone, margin, apart, alpha):  # type: ignore[no-untyped-def]
+    """Whether any pair or any cable's place in the cone has no more than a margin (cosine).
+
+    ``cos_angle`` is that of the widest angle that any pair keeps.
+    """
     wide = window(n, cos_angle - margin, alpha)
     begin = 0
     for i in range(n):
@@ -56,14 +60,16 @@ def is_broken(n, cos_angle, cos_cone, margin, alpha):  # type: ignore[no-untyped
             begin += 1
         for j in range(begin, i):
             c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
-            if not cos_angle - c > margin:
+            if not cos_angle - c > margin and not (
+                apart.capped and distance.cap_of(n, i, j, apart) - c > margin
+            ):
                 return True
-    return False
+    return apart.stacked and distance.is_too_near(n, apart, margin, alpha)
 
 
 @inline
-def push_of(n, i, aim, rim, alpha):  # type: ignore[no-untyped-def]
-    """Tangential push on cable i, rad: half of every deficit of angle, all of that from the cone."""
+def push_of(n, i, aim, rim, apart, alpha):  # type: ignore[no-untyped-def]
+    """Tangential push on cable i, rad: half of every deficit of angle or distance, all of that from the cone."""
     x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
     cos_aim = math.cos(aim)
     px = py = pz = 0.0
@@ -73,6 +79,11 @@ def push_of(n, i, aim, rim, alpha):  # type: ignore[no-untyped-def]
         c = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
         if c <= cos_aim:
             continue
+        wanted = aim
+        if apart.capped:
+            wanted = math.acos(distance.cap_of(n, i, j, apart)) + BUFFER
+            if c <= math.cos(wanted):
+                continue
         dx = x - alpha[3 * j]
         dy = y - alpha[3 * j + 1]
         dz = z - alpha[3 * j + 2]
@@ -81,7 +92,7 @@ def push_of(n, i, aim, rim, alpha):  # type: ignore[no-untyped-def]
             angle = 2.399963229728653 * i
             dx, dy, dz = math.cos(angle), math.sin(angle), 0.5 * math.cos(1.7 * angle)
             norm = math.sqrt(dx * dx + dy * dy + dz * dz)
-        push = 0.5 * (aim - math.acos(min(c, 1.0))) / norm
+        push = 0.5 * (wanted - math.acos(min(c, 1.0))) / norm
         px += push * dx
         py += push * dy
         pz += push * dz
@@ -93,11 +104,14 @@ def push_of(n, i, aim, rim, alpha):  # type: ignore[no-untyped-def]
         px += push * z * ex
         py += push * z * ey
         pz -= push * h
+    if apart.stacked:
+        ax, ay, az = distance.push_apart(n, i, BUFFER, apart, alpha)
+        px, py, pz = px + ax, py + ay, pz + az
     return px, py, pz
 
 
 @inline
-def is_no_worse(n, i, x, y, z, cos_angle, cos_cone, alpha):  # type: ignore[no-untyped-def]
+def is_no_worse(n, i, x, y, z, cos_angle, cos_cone, apart, alpha):  # type: ignore[no-untyped-def]
     """Whether cable i may move to (x, y, z): no kept limit breaks, no broken one gets worse."""
     u, v, w = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
     if -z - cos_cone < min(1e-6, -w - cos_cone):
@@ -106,14 +120,23 @@ def is_no_worse(n, i, x, y, z, cos_angle, cos_cone, alpha):  # type: ignore[no-u
         if j != i:
             new = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
             old = u * alpha[3 * j] + v * alpha[3 * j + 1] + w * alpha[3 * j + 2]
-            if cos_angle - new < min(1e-6, cos_angle - old):
+            most = distance.cap_of(n, i, j, apart) if apart.capped else cos_angle
+            if most - new < min(1e-6, most - old):
                 return False
+            if apart.stacked:
+                a, b, c = alpha[3 * j], alpha[3 * j + 1], alpha[3 * j + 2]
+                left = distance.room(i, j, apart, x, y, z, a, b, c)
+                if left < min(1e-6, distance.room(i, j, apart, u, v, w, a, b, c)):
+                    return False
     return True
 
 
 @inline
-def lead_back(n, min_angle, cone, delta, start, alpha):  # type: ignore[no-untyped-def]
-    """Move ``alpha`` from ``start`` towards the limits, cable by cable, each within its rate."""
+def lead_back(n, min_angle, cone, delta, start, apart, alpha):  # type: ignore[no-untyped-def]
+    """Move ``alpha`` from ``start`` towards the limits, cable by cable, each within its rate.
+
+    ``min_angle`` is the widest that any pair keeps.
+    """
     cos_angle, cos_cone = math.cos(min_angle), math.cos(cone)
     aim = min_angle + BUFFER
     rim = max(cone - BUFFER, 0.5 * cone)
@@ -121,7 +144,7 @@ def lead_back(n, min_angle, cone, delta, start, alpha):  # type: ignore[no-untyp
     for _ in range(SWEEPS):
         moved = False
         for i in range(n):
-            px, py, pz = push_of(n, i, aim, rim, alpha)
+            px, py, pz = push_of(n, i, aim, rim, apart, alpha)
             size = math.sqrt(px * px + py * py + pz * pz)
             if size < 1e-9:
                 continue
@@ -143,7 +166,7 @@ def lead_back(n, min_angle, cone, delta, start, alpha):  # type: ignore[no-untyp
                 x *= norm
                 y *= norm
                 z *= norm
-                if is_no_worse(n, i, x, y, z, cos_angle, cos_cone, alpha):
+                if is_no_worse(n, i, x, y, z, cos_angle, cos_cone, apart, alpha):
                     alpha[3 * i] = x
                     alpha[3 * i + 1] = y
                     alpha[3 * i + 2] = z
