@@ -19,6 +19,7 @@ from pydantic import Field
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
+from colift.world.plant._contact import P
 
 SETTINGS = 4
 """Parameters after those of the bodies: time constant, damping ratio, impedance, substeps."""
@@ -37,7 +38,7 @@ def _text(*numbers: float) -> str:
 
 def model_xml(params: Vector) -> str:
     """MJCF of load, drones and cables."""
-    load_mass, gravity = params[:MASS]
+    load_mass, gravity = params[: P.ground]
     bodies = params[MASS:-SETTINGS].reshape(-1, BODY)
     time_constant, damping_ratio, impedance = params[-SETTINGS:-1]
     limit = (
@@ -45,7 +46,7 @@ def model_xml(params: Vector) -> str:
         f'solimplimit="{_text(impedance, impedance, 1.0)}"'
     )
     drones, cables, motors = [], [], []
-    for i, (mass, length, *inertia) in enumerate(bodies):
+    for i, (mass, length, *inertia, _) in enumerate(bodies):
         drones.append(
             f'<body pos="0 0 {_text(length)}"><freejoint/><inertial pos="0 0 0" mass="{_text(mass)}" '
             f'diaginertia="{_text(*inertia)}"/><site name="{i}"/></body>'
@@ -130,6 +131,7 @@ class Mujoco(BodiesPart):
     """MuJoCo: rigid bodies, and tendons with a soft limit of their length for cables."""
 
     kernel = _step
+    anchored = False
     needs = ("mujoco", "mujoco")
 
     time_constant: Annotated[float, Field(ge=1e-4, le=1.0)] = 0.002
