@@ -103,7 +103,8 @@ class Rig:
         nodes = np.concatenate([*nodes, np.tile(self.load[0], (self.n, 1, 1))], axis=1)
         lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
         rest = self.team.cable_lengths[:, None] / lengths.shape[1]
-        stretch = np.maximum(lengths - rest, 0.0) * self.attached[:, None]
+        stretch = np.maximum(lengths - rest, 0.0)
+        stretch[:, -1] *= self.attached  # a cut is at the load's end
         return 0.5 * np.sum(self.part.stiffness / rest * stretch**2)
 
     def energy(self):

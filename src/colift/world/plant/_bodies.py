@@ -19,16 +19,11 @@ from colift.kernel.math import quaternion
 from colift.part import Places, Vector
 from colift.team import Ground, Team
 from colift.team.geometry import min_norm_tensions
-from colift.world.plant._contact import (
-    ANCHORS,
-    BODY,
-    DRONE,
-    LOAD,
-    MASS,
-    PARAMS,
-    damping_ratio,
-    feet,
-)
+from colift.world.plant._contact import ANCHORS, PARAMS, damping_ratio, feet
+from colift.world.plant._contact import BODY as BODY
+from colift.world.plant._contact import DRONE as DRONE
+from colift.world.plant._contact import LOAD as LOAD
+from colift.world.plant._contact import MASS as MASS
 from colift.world.plant.base import OBSERVE_SIGNATURE, STATE, PlantPart, Start
 
 

@@ -94,9 +94,9 @@ def rest(y, o, w, params, dy):  # type: ignore[no-untyped-def]
 
 
 @inline
-def derivative(
+def derivative(  # type: ignore[no-untyped-def]
     n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, T, forces, dy
-):  # type: ignore[no-untyped-def]
+):
     """Time derivative of the state; fills the tensions ``T`` at the load's end and the ground's ``forces``."""
     free_motion(n, y, thrusts, torques, external, params, dy)
     grounded = params[P.ground] > 0.0
