@@ -11,6 +11,7 @@ from plant_rig import DOWN, Rig, rotation
 from colift import part
 from colift.team import Ground, Team
 from colift.world.plant._contact import RATE, damping_ratio, feet
+from colift.world.plant.mujoco import Mujoco
 
 SETTINGS = {"bead-cables": {"drag_coefficient": 0.0, "beads": 2}}
 G = 9.81
@@ -86,7 +87,10 @@ def test_a_body_falls_touches_with_its_speed_and_rests(plant):
         rig.step()
         fastest = np.maximum(fastest, rig.touch_speeds)
     np.testing.assert_allclose(fastest, np.sqrt(2.0 * G * 0.2), atol=0.01)
-    np.testing.assert_allclose(rig.load[0, 2], -G / RATE**2, atol=2e-5)
+    sag = (
+        0.0 if isinstance(plant, Mujoco) else G / RATE**2
+    )  # its constraint holds weight without a stretch
+    np.testing.assert_allclose(rig.load[0, 2], -sag, atol=2e-5)
     np.testing.assert_allclose(rig.drones[:, 2], -G / RATE**2, atol=2e-4)
     assert np.abs(rig.load[1]).max() < 1e-6
     assert np.abs(rig.drones[:, 3:6]).max() < 1e-5

@@ -516,7 +516,7 @@ def start_state(mission: Mission) -> Start:
     upward = np.array([0.0, 0.0, 1.0])
     aim = np.where(norms > 1e-9, thrust / np.maximum(norms, 1e-9), upward)
     load = first[0] + np.asarray(mission.start.load_offset)
-    if mission.start.on == "ground" and mission.ground is not None:
+    if mission.start.on_ground and mission.ground is not None:
         load[2] = mission.ground.height
     places = mission.start_places(load)
     if places is not None:

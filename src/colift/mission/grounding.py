@@ -28,17 +28,17 @@ def ground_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
         message = f"must be drones.count = {n}"
         yield Problem("start.positions", f"{len(start.positions)} places", message)
         return
-    if start.on == "ground" and ground is None:
+    if start.on_ground and ground is None:
         message = 'needs a ground to stand on, but world.ground = "none"'
-        yield Problem("start.on", "ground", message)
+        yield Problem("start.on_ground", "true", message)
         return
     if start.slack and isinstance(plant, PlantPart) and not plant.slackens:
-        field = "on" if start.on == "ground" else "positions"
+        field, value = ("on_ground", "true") if start.on_ground else ("positions", "")
         message = (
             f'may leave cables slack, but those of plant.kind = "{kind_of(type(plant))}" are rods; '
             'set plant.kind = "slack-cables"'
         )
-        yield Problem(f"start.{field}", start.on if field == "on" else "", message)
+        yield Problem(f"start.{field}", value, message)
         return
     reference = parts.get("reference")
     if not isinstance(reference, ReferencePart):
@@ -48,7 +48,7 @@ def ground_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
     load = path[0] + np.asarray(start.load_offset)
     if ground is not None:
         yield from _below(frame, ground.height, path[:, 2], times, load)
-        if start.on == "ground":
+        if start.on_ground:
             load[2] = ground.height
     places = frame.start_places(load)
     if places is None:
@@ -81,7 +81,7 @@ def _below(
 ) -> Iterable[Problem]:
     """A load that starts, or is led, into the ground."""
     allowed = f'must be at least world.ground.height = {height:g} m; lower it, or set world.ground = "none"'
-    if frame.start.on != "ground" and load[2] < height - DEEP:
+    if not frame.start.on_ground and load[2] < height - DEEP:
         yield Problem("start.load_offset", f"z = {load[2]:.4g} m at t = 0", f"the load {allowed}")
         return
     deep = np.flatnonzero(z < height - DEEP)

@@ -282,8 +282,8 @@ class Start(Section):
     """Cable directions from drone to load instead of the ring, one per drone; any length but zero."""
     load_offset: Point = (0.0, 0.0, 0.0)
     """Offset of the load from the reference's first point, m."""
-    on: Literal["cables", "ground"] = "cables"
-    """On what: taut cables hold the load; or load and drones stand on the ground, the drones around the load, cables slack."""
+    on_ground: bool = False
+    """Whether load and drones stand on the ground, the drones around the load, cables slack; otherwise taut cables hold the load."""
     spread: Annotated[float, Field(gt=0.0, le=1.0)] = 0.7
     """On the ground, distance of each drone from the load as a share of its cable, in the direction of its place in the formation."""
     positions: list[Point] | None = None
@@ -292,7 +292,7 @@ class Start(Section):
     @property
     def slack(self) -> bool:
         """Whether cables may be slack at the start."""
-        return self.on == "ground" or self.positions is not None
+        return self.on_ground or self.positions is not None
 
     def problems(self) -> list[tuple[str, str, str]]:
         """Directions without a length."""
@@ -476,7 +476,7 @@ class Frame(Section):
         drones = self.first_drones()
         if self.start.positions is not None:
             return np.array(self.start.positions, dtype=float)[drones]
-        if self.start.on == "cables":
+        if not self.start.on_ground:
             return None
         level = -self.start_directions()
         level[:, 2] = 0.0

@@ -194,7 +194,7 @@ def _lost(recording: Recording, values: Mapping[str, float]) -> list[str]:
     if not mission.kinds:
         return found
     if "attached" in recording and len(recording.time):
-        holding = (np.nan_to_num(recording["attached"]) > 0.0).any(axis=1)
+        holding = np.any(np.nan_to_num(recording["attached"]) > 0.0, axis=1)
         if not holding[-1]:
             found += _let_go(recording, int(np.flatnonzero(holding)[-1]) if holding.any() else 0)
     far = values.get("tracking_max_m", math.nan)
@@ -219,7 +219,7 @@ def _let_go(recording: Recording, held: int) -> list[str]:
         return [said]
     speed = float(np.max(recording["touch_speeds"][held:, -1]))
     if recording["ground_forces"][-1, -1, 2] > 0.0:
-        return [f"{said}; it fell onto the ground with {speed:.3g} m/s"] if speed > SOFT else []
+        return [said, f"the load fell onto the ground with {speed:.3g} m/s"] if speed > SOFT else []
     return [said]
 
 
