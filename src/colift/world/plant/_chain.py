@@ -237,7 +237,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                     slack_times[i] += h
         normalise(n, y)
         if params[P.ground] > 0.0:
-            settle(n, begin, y, params, anchors, writes.touch_speeds)
+            settle(n, begin, y, w, params, anchors, writes.touch_speeds)
 
 
 def level_arc(

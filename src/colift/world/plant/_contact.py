@@ -4,11 +4,11 @@ A body of mass ``m`` whose lowest point is ``d`` below the surface, with the spe
 
     N = max(0, m (w^2 d - 2 zeta w v_z))                         where d > 0
     F = -m (w^2 (x - a) + 2 w v)  of its level part,             |F| <= mu N
-    |x - a| <= mu d                                              after each substep
+    |x - a| <= mu min(d, 2 g / w^2)                              after each substep
 
 ``a`` is the body's *anchor*, the place that friction holds it at; it follows a body that slides, and one that flies. It is
 bounded by what the spring presses, not by ``N``, in which the damper would lend the anchor a stretch that nobody has paid
-for. At rest a body sinks in by ``g / w^2``, on every mass alike, and slides with ``mu m g``.
+for; and by twice what weight alone presses, or a hard landing would wind it up and throw the body back along the ground. At rest a body sinks in by ``g / w^2``, on every mass alike, and slides with ``mu m g``.
 
 The load touches with its point, a drone with four feet in the plane of its centre, each for a quarter of its mass: so a
 drone that comes down aslant is levelled, and the energy of that comes from its weight. The feet stand no farther out than
@@ -33,6 +33,8 @@ RATE = 300.0
 """The rate ``w`` of contact, 1/s: a body at rest sinks in by 0.11 mm."""
 RESOLVED = 0.3
 """Largest ``w`` times substep: at substeps above 1 ms the ground becomes softer, at 10 ms 30 / s and 11 mm."""
+HELD = 2.0
+"""Depths of standing up to which pressing lets the anchor stretch."""
 FEET = 4
 
 LOAD: int = STATE.at.rows
@@ -199,16 +201,17 @@ def hold(y, o, anchors, a, reach):  # type: ignore[no-untyped-def]
 
 
 @inline
-def settle(n, begin, y, params, anchors, touch_speeds):  # type: ignore[no-untyped-def]
+def settle(n, begin, y, w, params, anchors, touch_speeds):  # type: ignore[no-untyped-def]
     """After a substep that began at ``begin``: anchors follow; keep the speed (m/s) of each body that came down in it."""
     height, friction = params[P.height], params[P.friction]
+    most = HELD * params[P.g] / (w * w)
     d = max(0.0, height - y[2])
-    hold(y, 0, anchors, 0, friction * d)
+    hold(y, 0, anchors, 0, friction * min(d, most))
     if d > 0.0 and begin[2] >= height:
         touch_speeds[n] = max(touch_speeds[n], -begin[5])
     for i in range(n):
         o = LOAD + DRONE * i
         d = depth(i, y, params)
-        hold(y, o, anchors, 2 * (i + 1), friction * d)
+        hold(y, o, anchors, 2 * (i + 1), friction * min(d, most))
         if d > 0.0 and depth(i, begin, params) == 0.0:
             touch_speeds[i] = max(touch_speeds[i], -begin[o + 5])

@@ -73,7 +73,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             forces = spare_of(memory, n)
     project(n, y, attached, params, T, alpha, b)
     if params[P.ground] > 0.0:
-        settle(n, begin, y, params, anchors, writes.touch_speeds)
+        settle(n, begin, y, w, params, anchors, writes.touch_speeds)
     for i in range(n):
         if tensions[i] < 0.0:
             slack_times[i] += dt

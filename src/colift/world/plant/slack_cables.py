@@ -219,7 +219,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             h = high if trial == BISECTIONS - 1 else 0.5 * (low + high)
         project(n, y, held, params, T, alpha, b)
         if params[P.ground] > 0.0:
-            settle(n, begin, y, params, anchors, writes.touch_speeds)
+            settle(n, begin, y, w, params, anchors, writes.touch_speeds)
         for i in range(n):
             if attached[i] > 0.0 and held[i] == 0.0:
                 slack_times[i] += high
