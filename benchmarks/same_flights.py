@@ -3,7 +3,7 @@
     git worktree add /tmp/before COMMIT
     python benchmarks/same_flights.py /tmp/before/src src
 
-Metrics that are times of this machine are left out. The loop's time is the shortest of several flights, in turns of the two
+Metrics that are times of this machine are left out, and those that one of the trees does not have. The loop's time is the shortest of several flights, in turns of the two
 trees, on whatever else the machine does. Exits with 1 when a metric differs.
 """
 
@@ -72,7 +72,7 @@ def main() -> int:
             (t, a), (u, b) = before.fly(mission), after.fly(mission)
             times[0].append(t)
             times[1].append(u)
-        changed = sorted(name for name in {*a, *b} if a.get(name) != b.get(name))
+        changed = sorted(name for name in {*a} & {*b} if a[name] != b[name])
         ratios.append(min(times[1]) / min(times[0]))
         different += bool(changed)
         said = "the same" if not changed else "different: " + ", ".join(changed)

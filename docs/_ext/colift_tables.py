@@ -316,6 +316,7 @@ class FieldTable(SphinxDirective):
     optional_arguments = 1
     sections: ClassVar[dict[str, str]] = {
         "world": "World",
+        "world.ground": "Ground",
         "load": "Load",
         "drones": "Drones",
         "truth": "Truth",

@@ -46,17 +46,38 @@ def test_with_the_papers_controllers_it_grows_to_metres_and_is_no_pass(name):
     assert any("tracking_max_m" in reason for reason in verdict.reasons)
 
 
-def test_a_load_let_go_is_lost():
-    """Released at 7 s; it falls until 12 s, with nothing there yet to stop it."""
+def test_a_load_let_go_on_the_ground_was_set_down():
+    """Led down to the ground by 6 s, released at 7 s: it lies there, and the drones fly on."""
     run = fly("s01b_land_release")
+    assert run.verdict.level == "pass"
+    assert run.metrics["touch_speed_mps"] < 0.3
+    assert np.abs(run.recording["load"][-1, 1]).max() < 1e-6
+    assert run.recording["load"][-1, 0, 2] == pytest.approx(0.0, abs=1e-3)
+    assert run.recording["positions"][-1, :, 2].min() > 0.3
+
+
+def test_a_load_let_go_at_height_falls_onto_the_ground_and_is_lost():
+    run = fly("s01b_land_release", **{"fault.0.at": 2.0})
+    height = run.recording["load"][np.searchsorted(run.recording.time, 2.0), 0, 2]
+    fallen = np.sqrt(2.0 * 9.81 * height)
     assert run.verdict.level == "lost"
     assert "no cable holds the load at the end" in run.verdict.reasons
+    assert any("fell onto the ground" in reason for reason in run.verdict.reasons)
+    assert run.metrics["touch_speed_mps"] == pytest.approx(fallen, abs=0.15)
+    assert any("Load touches the ground with 4" in moment.text for moment in run.recording.moments)
+    assert run.recording["load"][-1, 0, 2] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_load_let_go_without_ground_falls_for_ever():
+    run = fly("s01b_land_release", **{"world.ground": "none"})
+    assert run.verdict.level == "lost"
     assert any("underground" in reason for reason in run.verdict.reasons)
 
 
-def test_a_load_that_sinks_below_the_ground_is_no_pass():
+def test_a_team_that_cannot_take_off_is_no_pass():
+    """Without anything that leads it through the take-off."""
     run = fly("s01_takeoff_ground")
-    assert run.metrics["min_height_m"] < 0.0
+    assert run.metrics["min_height_m"] > -0.01
     assert run.verdict.level in {"fail", "lost"}
 
 

@@ -47,6 +47,7 @@ class Rig:
         self.external, self.attached = np.zeros((n + 1, 3)), np.ones(n)
         self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
         self.peak_tensions, self.catch_impulses = np.zeros(n + 1), np.zeros(n)
+        self.ground_forces, self.touch_speeds = np.zeros((n + 1, 3)), np.zeros(n + 1)
 
     def straighten(self):
         """Put beads evenly between drone and load, in motion with them."""
@@ -66,7 +67,8 @@ class Rig:
             "applied_thrusts": self.thrusts, "applied_torques": self.torques,
             "external_forces": self.external, "attached": self.attached, "tensions": self.tensions,
             "peak_tensions": self.peak_tensions, "catch_impulses": self.catch_impulses,
-            "slack_times": self.slack_times,
+            "slack_times": self.slack_times, "ground_forces": self.ground_forces,
+            "touch_speeds": self.touch_speeds,
         }  # fmt: skip
 
     def observe(self):
@@ -101,7 +103,8 @@ class Rig:
         nodes = np.concatenate([*nodes, np.tile(self.load[0], (self.n, 1, 1))], axis=1)
         lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
         rest = self.team.cable_lengths[:, None] / lengths.shape[1]
-        stretch = np.maximum(lengths - rest, 0.0) * self.attached[:, None]
+        stretch = np.maximum(lengths - rest, 0.0)
+        stretch[:, -1] *= self.attached  # a cut is at the load's end
         return 0.5 * np.sum(self.part.stiffness / rest * stretch**2)
 
     def energy(self):

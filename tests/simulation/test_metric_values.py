@@ -32,6 +32,8 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["peak_tensions"][:, -1] = 1.0 + time
     arrays["peak_tensions"][7, 0], arrays["peak_tensions"][8, -1] = 30.0, 40.0  # between rows
     arrays["catch_impulses"][9, 0] = 0.3
+    arrays["ground_forces"][100:150, -1, 2] = 2.0
+    arrays["touch_speeds"][99, -1] = 0.7
     arrays["saturated_times"][-1] = 0.25
     arrays["desired_tensions"][:] = arrays["tensions"] - 0.25
     arrays["directions"][:] = ring(n, np.radians(40.0))
@@ -96,6 +98,8 @@ EXPECTED = {
     "slack_time_s": 2.0,
     "saturated_time_s": 1.0,
     "min_height_m": 3.0 - 0.04,
+    "touch_speed_mps": 0.7,
+    "ground_time_s": 0.5,
     "lost_drones": 1.0,
     "detection_delay_s": 0.12,
     "allocator_failures": 2.0,
@@ -120,7 +124,7 @@ def test_every_metric_has_a_known_answer_a_unit_and_a_meaning():
     assert set(found) == set(EXPECTED)
     for name, metric in found.items():
         assert metric.meaning
-        suffix = metric.unit.replace(" ", "")
+        suffix = metric.unit.replace(" ", "").replace("/", "p")
         assert metric.unit == "1" or name.endswith(f"_{suffix}")
 
 

@@ -122,7 +122,7 @@ def test_opening_imports_no_kernel() -> None:
     assert not [name for name in own if name.endswith(".base") or "loop" in name]
 
 
-NEWER = {"phase", "clock", "measured_ages", "estimated_ages", "received_ages", "agent_status",
+NEWER = {"phase", "ground_forces", "touch_speeds", "clock", "measured_ages", "estimated_ages", "received_ages", "agent_status",
          "estimated_forces", "estimated_wind"}  # fmt: skip
 """Signals that came after the recording that is kept here."""
 

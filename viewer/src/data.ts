@@ -34,6 +34,8 @@ export interface FlightInfo {
   cable_lengths: number[];
   /** From a drone's centre to its outermost tip, m, where that is known. */
   radii: (number | null)[];
+  /** Height of the ground, m, where there is one. */
+  ground: number | null;
   /** Least angle that was asked for, if any was. */
   safe_angle_deg: number | null;
   /** Weight of the load and mean thrust of a drone, N: they set the length of arrows. */

@@ -51,6 +51,11 @@ export const KINDS = {
     "shape": "M6 1.5L6 10.5M2.5 7L6 10.5L9.5 7",
     "tone": "bad"
   },
+  "ground": {
+    "word": "on the ground",
+    "shape": "M1.5 10.5L10.5 10.5M6 1.5L6 8M3.5 5.5L6 8L8.5 5.5",
+    "tone": "info"
+  },
   "slack": {
     "word": "slack",
     "shape": "M1 4Q6 12 11 4",

@@ -14,6 +14,7 @@ export function info(n: number, changes: Partial<FlightInfo> = {}): FlightInfo {
     cable_lengths: Array<number>(n).fill(1),
     radii: Array<null>(n).fill(null),
     safe_angle_deg: null,
+    ground: 0,
     weight: 2,
     thrust: 5,
     facts: {},

@@ -549,7 +549,7 @@ def _refill(vector: Vector, packed: Vector, path: str) -> None:
 def start_state(mission: Mission) -> Start:
     """Of the drones that fly at first: at rest on the start formation, each drone's thrust holding its share of the load.
 
-    The attitude is the zero-yaw one for the static thrust, so that the flight starts in balance.
+    The attitude is the zero-yaw one for the static thrust, so that the flight starts in balance; level where cables may be slack.
     """
     drones = mission.first_drones()
     team = mission.team.of(drones)
@@ -561,9 +561,16 @@ def start_state(mission: Mission) -> Start:
     norms = np.linalg.norm(thrust, axis=1, keepdims=True)
     upward = np.array([0.0, 0.0, 1.0])
     aim = np.where(norms > 1e-9, thrust / np.maximum(norms, 1e-9), upward)
+    load = first[0] + np.asarray(mission.start.load_offset)
+    if mission.start.on_ground and mission.ground is not None:
+        load[2] = mission.ground.height
+    places = mission.start_places(load)
+    if places is not None:
+        aim = np.tile(upward, (team.n, 1))
     return Start(
-        load_position=first[0] + np.asarray(mission.start.load_offset),
+        load_position=load,
         load_velocity=np.zeros(3),
         directions=directions,
         attitudes=zero_yaw_quaternion(aim),
+        places=places,
     )

@@ -46,7 +46,7 @@ Common = named_tuple(
     "Common",
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
-        "peak_tensions", "catch_impulses", "carrying", "clock", "reference",
+        "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "reference",
         "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends",
         *(name for name in agents.SIGNALS if name != "carrying"),
     ],
@@ -181,6 +181,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
                 log[row, m] = bus.row[m]
             bus.peak_tensions[:] = 0.0
             bus.catch_impulses[:] = 0.0
+            bus.touch_speeds[:] = 0.0
         for i in range(n):
             if bus.carrying[i] == 0.0:
                 return k + 1

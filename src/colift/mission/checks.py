@@ -17,6 +17,7 @@ from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
 from colift.mission.criteria import METRICS
 from colift.mission.forecast import forecast
+from colift.mission.grounding import ground_checks
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
 from colift.team import contact
@@ -93,6 +94,7 @@ def cross_checks(
         message = f"must be at most {MAX_DISTURBANCES}"
         yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)
     yield from _fault_checks(frame, parts, lists["fault"], broken)
+    yield from ground_checks(frame, parts, broken)
 
 
 def _of_drones(frame: Frame, field: str) -> str:

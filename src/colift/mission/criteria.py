@@ -39,6 +39,8 @@ METRICS = (
     Metric("slack_time_s", "s", "time without tension, summed over cables"),
     Metric("saturated_time_s", "s", "time in which motors could not give what was commanded, summed over drones"),
     Metric("min_height_m", "m", "least height of the load"),
+    Metric("touch_speed_mps", "m/s", "largest downward speed with which the load came onto the ground; 0 if it never did"),
+    Metric("ground_time_s", "s", "time that the load was on the ground"),
     Metric("lost_drones", "1", "drones that left before the end"),
     Metric("detection_delay_s", "s", "longest time from a cut cable or dead motors to the drone's leaving the team"),
     Metric("allocator_failures", "1", "allocations that failed: not the best answer, and no limit to blame"),

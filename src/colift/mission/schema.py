@@ -21,6 +21,7 @@ from pydantic import (
 
 from colift.catalogue import LAYERS
 from colift.errors import ColiftError
+from colift.team import Ground as GroundBelow
 from colift.team import Team, vehicles
 from colift.team.geometry import Array, ring, ring_cone
 
@@ -95,11 +96,27 @@ class Section(BaseModel):
         ]
 
 
+class Ground(Section):
+    """Level ground under everything (:class:`colift.team.Ground`)."""
+
+    height: Coordinate = 0.0
+    """Of its surface, m."""
+    friction: Annotated[float, Field(ge=0.0, le=10.0)] = 0.8
+    """Coefficient of friction of load and drones on it."""
+    restitution: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Speed with which a body bounces off it over that with which it fell; a fast fall returns 0.135 at least."""
+
+
 class World(Section):
     """Surroundings."""
 
     gravity: Annotated[float, Field(ge=0.0, le=100.0)] = 9.81
     """m/s^2."""
+    ground: Annotated[
+        Annotated[Ground, Tag("table")] | Annotated[Literal["none"], Tag("none")],
+        Discriminator(lambda value: "none" if isinstance(value, str) else "table"),
+    ] = Ground()
+    """The ground, at z = 0 unless its table says otherwise; or ``"none"``, which lets things fall for ever."""
 
 
 class Load(Section):
@@ -302,6 +319,17 @@ class Start(Section):
     """Cable directions from drone to load instead of the ring, one per drone; any length but zero."""
     load_offset: Point = (0.0, 0.0, 0.0)
     """Offset of the load from the reference's first point, m."""
+    on_ground: bool = False
+    """Whether load and drones stand on the ground, the drones around the load, cables slack; otherwise taut cables hold the load."""
+    spread: Annotated[float, Field(gt=0.0, le=1.0)] = 0.7
+    """On the ground, distance of each drone from the load as a share of its cable, in the direction of its place in the formation."""
+    positions: list[Point] | None = None
+    """Places of the drones, world, m, one per drone; cables between them and the load may be slack."""
+
+    @property
+    def slack(self) -> bool:
+        """Whether cables may be slack at the start."""
+        return self.on_ground or self.positions is not None
 
     def problems(self) -> list[tuple[str, str, str]]:
         """Directions without a length."""
@@ -445,7 +473,14 @@ class Frame(Section):
             load_mass=self.load.mass,
             cable_lengths=np.array(np.broadcast_to(drones.cable_length, n), dtype=float),
             gravity=self.world.gravity,
+            ground=self.ground,
         )
+
+    @property
+    def ground(self) -> GroundBelow | None:
+        """What is below the team."""
+        found = self.world.ground
+        return None if found == "none" else GroundBelow(**dict(found))
 
     @property
     def true_team(self) -> Team:
@@ -485,6 +520,21 @@ class Frame(Section):
             return ring(len(drones), self.start_cone, heading=heading)
         given = np.array(self.start.directions, dtype=float)[drones]
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
+
+    def start_places(self, load: Array) -> Array | None:
+        """Places (k, 3) of the drones that fly from the start, world, m, around a load at ``load``; None for those on taut cables."""
+        drones = self.first_drones()
+        if self.start.positions is not None:
+            return np.array(self.start.positions, dtype=float)[drones]
+        if not self.start.on_ground:
+            return None
+        level = -self.start_directions()
+        level[:, 2] = 0.0
+        sizes = np.linalg.norm(level, axis=1, keepdims=True)
+        level = np.where(
+            sizes > 1e-9, level / np.maximum(sizes, 1e-9), ring(len(drones), math.pi / 2)
+        )
+        return np.asarray(load + self.start.spread * self.team.cable_lengths[drones, None] * level)
 
 
 class Described(Frame):

@@ -286,6 +286,22 @@ def saturated_time_s(r: Recording) -> float:
 
 
 @_metric
+def touch_speed_mps(r: Recording) -> float:
+    return _largest(r["touch_speeds"][:, -1]) if _has_ground(r) else math.nan
+
+
+@_metric
+def ground_time_s(r: Recording) -> float:
+    if not (_has_ground(r) and r.measured("ground_forces")):
+        return math.nan
+    return integral((r["ground_forces"][:, -1, 2] > 0.0).astype(float), r.time)
+
+
+def _has_ground(r: Recording) -> bool:
+    return r.mission.ground is not None
+
+
+@_metric
 def min_height_m(r: Recording) -> float:
     return -_largest(-r["load"][:, 0, 2])
 

@@ -29,6 +29,7 @@ KINDS = {
     "departure": "drone leaves",
     "join": "drone joins",
     "descent": "descent",
+    "ground": "on the ground",
     "slack": "slack",
     "angle": "angle below limit",
     "fallback": "fallback",
@@ -165,6 +166,7 @@ class _Ongoing(NamedTuple):
 def _ongoing(recording: Recording) -> Iterator[_Ongoing]:
     yield from _faults(recording)
     yield from _slack(recording)
+    yield from _touches(recording)
     yield from _fallbacks(recording)
     yield from _angles(recording)
     yield from _gaps(recording)
@@ -252,6 +254,27 @@ def _slack(recording: Recording) -> Iterator[_Ongoing]:
 
         text = f"Cable {i} slack"
         yield _Ongoing("slack", "", i, recording.time, grown[:, i] > 0.0, _always(text), more)
+
+
+def _touches(recording: Recording) -> Iterator[_Ongoing]:
+    """Drones and load on the ground, and how fast they came down."""
+    forces, speeds = _known(recording, "ground_forces"), _known(recording, "touch_speeds")
+    if forces is None or speeds is None:
+        return
+    pressed = forces[..., 2] > 0.0
+    for i in np.flatnonzero(pressed.any(axis=0)).tolist():
+        whose, drone = ("Load", None) if i == recording.n else (f"Drone {i}", i)
+
+        def text(first: int, last: int, whose: str = whose, speed: Array = speeds[:, i]) -> str:
+            # The force is that of a step's begin, a touch that of its end: they may be a row apart.
+            fastest = np.nanmax(speed[max(first - 1, 0) : last + 1])
+            if fastest > 0.0:
+                return f"{whose} touches the ground with {fastest:.2g} m/s"
+            return f"{whose} stands on the ground"
+
+        yield _Ongoing(
+            "ground", whose, drone, recording.time, pressed[:, i], text, _lasting(recording.time)
+        )
 
 
 def _fallbacks(recording: Recording) -> Iterator[_Ongoing]:

@@ -30,6 +30,12 @@ UPRIGHT = 90.0
 LEAST_LOST = 2.0
 """A load nearer to its reference than this, or than three of the longest cable, is late but not lost, m."""
 
+PRESSED = 0.02
+"""How far below the ground's surface a load may press itself, m."""
+
+SOFT = 0.3
+"""Speed up to which a load that nothing holds any more was set down, and not dropped, m/s."""
+
 SUNK = 0.5
 """Depth below the lowest height allowed from which on a load is lost, m."""
 
@@ -119,7 +125,9 @@ def criteria_of(mission: Described) -> dict[str, Bound]:
         return own
     default = {
         "tracking_max_m": Bound(max=NEAR),
-        "min_height_m": Bound(min=0.0),
+        "min_height_m": Bound(
+            min=0.0 if mission.ground is None else mission.ground.height - PRESSED
+        ),
         "max_tilt_deg": Bound(max=UPRIGHT),
     }
     for metric, setting in _ASKED.items():
@@ -191,9 +199,9 @@ def _lost(recording: Recording, values: Mapping[str, float]) -> list[str]:
     if not mission.kinds:
         return found
     if "attached" in recording and len(recording.time):
-        holding = np.nan_to_num(recording["attached"][-1]) > 0.0
-        if not holding.any():
-            found.append("no cable holds the load at the end")
+        holding = np.any(np.nan_to_num(recording["attached"]) > 0.0, axis=1)
+        if not holding[-1]:
+            found += _let_go(recording, int(np.flatnonzero(holding)[-1]) if holding.any() else 0)
     far = values.get("tracking_max_m", math.nan)
     bounds = criteria_of(mission)
     allowed = max(LEAST_LOST, 3.0 * float(mission.team.cable_lengths.max()))
@@ -201,9 +209,23 @@ def _lost(recording: Recording, values: Mapping[str, float]) -> list[str]:
         found.append(f"the load was {far:.4g} m off its reference")
     low, floor = values.get("min_height_m", math.nan), bounds["min_height_m"].min
     if floor is not None and low < floor - SUNK:
-        where = "underground" if floor == 0.0 else f"below the lowest height of {floor:g} m"
+        default = "min_height_m" not in mission.criteria
+        where = (
+            "underground" if default or floor == 0.0 else f"below the lowest height of {floor:g} m"
+        )
         found.append(f"the load was {floor - low:.4g} m {where}")
     return found
+
+
+def _let_go(recording: Recording, held: int) -> list[str]:
+    """Why a load that no cable holds after row ``held`` is lost; empty where it was set down."""
+    said = "no cable holds the load at the end"
+    if "touch_speeds" not in recording or "ground_forces" not in recording:
+        return [said]
+    speed = float(np.max(recording["touch_speeds"][held:, -1]))
+    if recording["ground_forces"][-1, -1, 2] > 0.0:
+        return [said, f"the load fell onto the ground with {speed:.3g} m/s"] if speed > SOFT else []
+    return [said]
 
 
 DESCENDED = "descended"

@@ -1,6 +1,7 @@
 """What flies: drones, cables and load, and the geometry of their formations."""
 
 from colift.team.bodies import Team as Team
+from colift.team.ground import Ground as Ground
 from colift.team.vehicles import Vehicle as Vehicle
 
-__all__ = ["Team", "Vehicle"]
+__all__ = ["Ground", "Team", "Vehicle"]

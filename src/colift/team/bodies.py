@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from colift.errors import SettingError
+from colift.team.ground import Ground
 from colift.team.vehicles import Vehicle, complete, impossible, vehicle_of
 from colift.wording import numbers, shown
 
@@ -75,6 +76,8 @@ class Team:
         Of the full batteries, J.
     efficiencies : (n,) array
         Ideal power of the rotors in hover over the battery's power.
+    ground : Ground or None
+        What is below them; None for nothing.
 
     Raises
     ------
@@ -98,6 +101,7 @@ class Team:
     rotor_drags: NDArray[np.float64] = None  # type: ignore[assignment]
     energies: NDArray[np.float64] = None  # type: ignore[assignment]
     efficiencies: NDArray[np.float64] = None  # type: ignore[assignment]
+    ground: Ground | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.masses)
@@ -213,13 +217,20 @@ class Team:
         load_mass: float,
         cable_lengths: NDArray[np.float64],
         gravity: float = 9.81,
+        ground: Ground | None = None,
     ) -> Team:
         """The team of drones with these numbers, by field of :class:`colift.team.vehicles.Vehicle`."""
         arrays: dict[str, Any] = {
             place: np.array([body.get(name, UNKNOWN[place]) for body in bodies], dtype=float)
             for name, place in PLACES.items()
         }
-        return cls(load_mass=load_mass, cable_lengths=cable_lengths, gravity=gravity, **arrays)
+        return cls(
+            load_mass=load_mass,
+            cable_lengths=cable_lengths,
+            gravity=gravity,
+            ground=ground,
+            **arrays,
+        )
 
 
 _OPTIONAL = tuple(name for name in PLACES.values() if name not in ("masses", "inertias"))

@@ -33,6 +33,8 @@ export interface Hello {
   cable_lengths: number[];
   radii: (number | null)[];
   safe_angle_deg: number | null;
+  /** Height of the ground, m, where there is one. */
+  ground: number | null;
   knobs: Knob[];
   choices: Choice[];
 }

@@ -169,6 +169,7 @@ function about(hello: Hello): FlightInfo {
     cable_lengths: hello.cable_lengths,
     radii: hello.radii,
     safe_angle_deg: hello.safe_angle_deg,
+    ground: hello.ground,
     weight: mass * GRAVITY,
     thrust: 1,
     facts: {},

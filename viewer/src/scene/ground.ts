@@ -1,6 +1,6 @@
-// The ground: a grid of metres that fades out, its scale written, axes, and what lies straight below load and drones.
+// The ground: a grid of metres that fades out, on a disc where there is ground; its scale, axes, and shadows of load and drones.
 
-import { BufferGeometry, CircleGeometry, Color, Float32BufferAttribute, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, MeshBasicMaterial, Vector3 } from "three";
+import { BufferGeometry, CircleGeometry, Color, DoubleSide, Float32BufferAttribute, Group, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, Vector3 } from "three";
 import type { Maker } from "./element";
 
 /** Lines `every` metres around a centre, cut into pieces so that each end has a colour of its own. */
@@ -45,11 +45,15 @@ export const ground: Maker = (flight, { floor, drone, centre: middle, radius }) 
     new LineBasicMaterial(),
   );
   axes.position.z = 0.003;
+  const soil = new MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false, side: DoubleSide });
+  const disc = new Mesh(new CircleGeometry(half, 64), soil);
+  disc.position.set(centre.x, centre.y, -0.002);
+  disc.visible = flight.info.ground !== null;
   const shade = new MeshBasicMaterial({ transparent: true, opacity: 0.22, depthWrite: false });
   const spots = new InstancedMesh(new CircleGeometry(1, 28), shade, flight.n + 1);
   const plumb = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ transparent: true, opacity: 0.55 }));
   spots.frustumCulled = plumb.frustumCulled = false;
-  object.add(...layers.map(({ lines }) => lines), axes, spots, plumb);
+  object.add(disc, ...layers.map(({ lines }) => lines), axes, spots, plumb);
   object.position.z = floor;
 
   const matrix = new Matrix4();
@@ -65,6 +69,7 @@ export const ground: Maker = (flight, { floor, drone, centre: middle, radius }) 
       axes.material.color.set(palette.soft);
       plumb.material.color.set(palette.soft);
       shade.color.set(palette.shade);
+      soil.color.set(palette.ground);
     },
     update(frame, shown, labels) {
       for (let i = 0; i <= frame.n; i++) {

@@ -43,7 +43,7 @@ export class Stage {
     const box = new Box3().setFromPoints(points);
     const scale = {
       drone: 0.17 * mean,
-      floor: Math.min(0, Math.floor(box.min.z + 0.3)),
+      floor: flight.info.ground ?? Math.min(0, Math.floor(box.min.z + 0.3)),
       centre: box.getCenter(new Vector3()),
       radius: Math.max(2, 0.5 * box.getSize(new Vector3()).length()),
     };

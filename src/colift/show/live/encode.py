@@ -44,6 +44,7 @@ def hello(session: Session, role: str) -> str:
                 float(radius) if math.isfinite(radius) else None for radius in mission.team.radii
             ],
             "safe_angle_deg": limits(mission).angle_deg,
+            "ground": None if mission.ground is None else mission.ground.height,
             "legend": _legend(),
             "knobs": [
                 {**vars(knob), "value": values.get(name)} for name, knob in session.knobs.items()

@@ -22,6 +22,7 @@ MARKS = {
     "departure": Mark("M1.5 6L10.5 6M7 2.5L10.5 6L7 9.5", "bad"),
     "join": Mark("M6 1.5L6 10.5M1.5 6L10.5 6", "good"),
     "descent": Mark("M6 1.5L6 10.5M2.5 7L6 10.5L9.5 7", "bad"),
+    "ground": Mark("M1.5 10.5L10.5 10.5M6 1.5L6 8M3.5 5.5L6 8L8.5 5.5", "info"),
     "slack": Mark("M1 4Q6 12 11 4", "warn"),
     "angle": Mark("M6 1.5L11 10.5L1 10.5Z", "warn"),
     "fallback": Mark("M6 1L11 6L6 11L1 6Z", "info"),

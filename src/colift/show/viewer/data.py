@@ -88,6 +88,7 @@ def _flight(
         "n": recording.n,
         "cable_lengths": mission.team.cable_lengths.tolist(),
         "radii": [_number(radius) for radius in mission.team.radii],
+        "ground": None if mission.ground is None else mission.ground.height,
         "safe_angle_deg": limits(mission).angle_deg,
         "weight": mission.load.mass * mission.world.gravity,
         "thrust": (mission.load.mass + mission.team.masses.sum())

@@ -8,25 +8,23 @@ so that a drone whose cable is cut or slack needs no other description than one 
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from colift.kernel.jit import inline, kernel
-from colift.kernel.layout import Layout
 from colift.kernel.load import ends_of
 from colift.kernel.math import quaternion
 from colift.part import Places, Vector
-from colift.team import Team
+from colift.team import Ground, Team
 from colift.team.geometry import min_norm_tensions
+from colift.world.plant._contact import ANCHORS, PARAMS, damping_ratio, feet
+from colift.world.plant._contact import BODY as BODY
+from colift.world.plant._contact import DRONE as DRONE
+from colift.world.plant._contact import LOAD as LOAD
+from colift.world.plant._contact import MASS as MASS
 from colift.world.plant.base import OBSERVE_SIGNATURE, STATE, PlantPart, Start
-
-LOAD: int = STATE.at.rows
-DRONE: int = STATE.at.width
-PARAMS = Layout(team={"m_L": 1, "g": 1}, drone={"m": 1, "L": 1, "J": 3})
-MASS: int = PARAMS.at.rows
-BODY: int = PARAMS.at.width
-"""Where the first drone's numbers stand in the parameters, and how many each has."""
 
 
 def state_size(n: int) -> int:
@@ -162,11 +160,15 @@ class BodiesPart(PlantPart):
     """Base of the plants whose memory begins with the state of load and drones."""
 
     observe = observe
+    anchored: ClassVar[bool] = True
+    """Whether the memory ends with what contact with the ground remembers."""
 
     def params(self, team: Team) -> Vector:
+        ground = team.ground or Ground()
         return PARAMS.pack(
-            team.n, m_L=team.load_mass, g=team.gravity, m=team.masses, L=team.cable_lengths,
-            J=team.inertias,
+            team.n, m_L=team.load_mass, g=team.gravity, ground=float(team.ground is not None),
+            height=ground.height, friction=ground.friction, damping=damping_ratio(ground.restitution),
+            m=team.masses, L=team.cable_lengths, J=team.inertias, foot=feet(team),
         )  # fmt: skip
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -182,13 +184,22 @@ class BodiesPart(PlantPart):
         memory[0:3] = start.load_position
         memory[3:LOAD] = start.load_velocity
         drones = memory[LOAD : state_size(team.n)].reshape(team.n, DRONE)
-        drones[:, 0:3] = start.load_position - spans
+        drones[:, 0:3] = start.load_position - spans if start.places is None else start.places
         drones[:, 3:6] = start.load_velocity
         drones[:, 6:10] = start.attitudes
+        self._let_go(memory, team.n)
         return memory
+
+    def _let_go(self, memory: Vector, n: int) -> None:
+        """Put the anchors below the bodies."""
+        if self.anchored:
+            drones = memory[LOAD : state_size(n)].reshape(n, DRONE)
+            memory[-ANCHORS.size(n) :] = [*memory[:2], *drones[:, :2].ravel()]
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         # A new drone joins the load where it is by now, not where it was when last observed.
         joining = fresh[LOAD : state_size(places.size)].reshape(places.size, DRONE)
         joining[:, :LOAD] += old[:LOAD] - fresh[:LOAD]
-        return STATE.carry_over(old, fresh, places)
+        fresh = STATE.carry_over(old, fresh, places)
+        self._let_go(fresh, places.size)
+        return fresh

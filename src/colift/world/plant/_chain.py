@@ -40,6 +40,17 @@ from colift.world.plant._bodies import (
     runge_kutta,
     state_size,
 )
+from colift.world.plant._contact import (
+    P,
+    anchors_of,
+    contact_size,
+    press,
+    rate,
+    rub,
+    settle,
+    spare_of,
+    touch,
+)
 from colift.world.plant.base import STEP_SIGNATURE, Start
 
 BEAD = 6
@@ -73,9 +84,24 @@ def segment(y, a, b):  # type: ignore[no-untyped-def]
 
 
 @inline
-def derivative(n, k, y, thrusts, torques, external, attached, longest, params, T, dy):  # type: ignore[no-untyped-def]
-    """Time derivative of the state; fills the tensions ``T`` at the load's end."""
+def rest(y, o, w, params, dy):  # type: ignore[no-untyped-def]
+    """Add to the derivative what the ground does to the bead at ``o``, per mass; friction only brakes it, without an anchor."""
+    N = press(1.0, params[P.height] - y[o + 2], -y[o + 5], w, params[P.damping])
+    fx, fy = rub(1.0, 0.0, 0.0, y[o + 3], y[o + 4], w, params[P.friction] * N)
+    dy[o + 3] += fx
+    dy[o + 4] += fy
+    dy[o + 5] += N
+
+
+@inline
+def derivative(  # type: ignore[no-untyped-def]
+    n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, T, forces, dy
+):
+    """Time derivative of the state; fills the tensions ``T`` at the load's end and the ground's ``forces``."""
     free_motion(n, y, thrusts, torques, external, params, dy)
+    grounded = params[P.ground] > 0.0
+    if grounded:
+        touch(n, y, anchors, w, params, forces, dy)
     beads, cables = LOAD + DRONE * n, MASS + BODY * n
     wind = cables + CABLE * n
     for i in range(n):
@@ -88,6 +114,8 @@ def derivative(n, k, y, thrusts, torques, external, attached, longest, params, T
             o = beads + BEAD * (k * i + j)
             dy[o], dy[o + 1], dy[o + 2] = y[o + 3], y[o + 4], y[o + 5]
             dy[o + 3], dy[o + 4], dy[o + 5] = 0.0, 0.0, -params[1]
+            if grounded and y[o + 2] < params[P.height]:
+                rest(y, o, w, params, dy)
         T[i] = 0.0
         segments = k + 1 if attached[i] > 0.0 else k
         common = 0.0
@@ -187,14 +215,19 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     parting = column(memory, 4 * size, n, SPANS.parting)
     substeps = math.ceil(dt / longest)
     h = dt / substeps
+    anchors, w, forces = anchors_of(memory, n), rate(h), writes.ground_forces
     for substep in range(substeps):
         for m in range(size):
             begin[m] = y[m]
         for stage in range(4):
-            derivative(n, k, y, thrusts, torques, external, attached, longest, params, T, slope)
+            derivative(
+                n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, T, forces,
+                slope,
+            )  # fmt: skip
             runge_kutta(stage, size, h, begin, slope, total, y)
             if stage > 0:
                 continue
+            forces = spare_of(memory, n)
             raise_peaks(n, T, peak_tensions)
             note_catches(n, begin, attached, T, params, parting, catch_impulses)
             for i in range(n):
@@ -203,6 +236,34 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 if T[i] == 0.0 and attached[i] > 0.0:
                     slack_times[i] += h
         normalise(n, y)
+        if params[P.ground] > 0.0:
+            settle(n, begin, y, w, params, anchors, writes.touch_speeds)
+
+
+def level_arc(
+    a: NDArray[np.float64], b: NDArray[np.float64], length: float, k: int
+) -> NDArray[np.float64]:
+    """Points (k, 3) that divide a cable of this length from ``a`` to ``b`` into chords of a circle, all equal, bent to a side.
+
+    The circle's chords ``l`` and the distance ``D`` of the ends see its centre under ``phi / (k + 1)`` and ``phi``; the half angle
+    follows from ``sin(phi / 2) / sin(phi / 2 / (k + 1)) = D / l``, which falls from k + 1 to 0.
+    """
+    m, along = k + 1, b - a
+    D = float(np.linalg.norm(along))
+    low, high = 0.0, math.pi
+    for _ in range(60):
+        half = 0.5 * (low + high)
+        low, high = (
+            (half, high) if math.sin(half) * length > D * m * math.sin(half / m) else (low, half)
+        )
+    radius = 0.5 * length / m / math.sin(half / m)
+    ahead = along / D if D > 1e-9 else np.array([1.0, 0.0, 0.0])
+    side = np.cross([0.0, 0.0, 1.0], ahead)
+    size = np.linalg.norm(side)
+    side = side / size if size > 1e-9 else np.array([0.0, 1.0, 0.0])
+    angle = half * (2.0 * np.arange(1, m) / m - 1.0)[:, None]
+    bow = radius * (np.cos(angle) - math.cos(half))
+    return np.asarray(0.5 * (a + b) + radius * np.sin(angle) * ahead + bow * side)
 
 
 class ChainPart(BodiesPart):
@@ -271,19 +332,23 @@ class ChainPart(BodiesPart):
 
     def memory(self, team: Team) -> Vector:
         size = state_size(team.n) + BEAD * self.bead_count * team.n
-        return np.zeros(4 * size + SCRATCH.size(team.n))
+        return np.zeros(4 * size + SCRATCH.size(team.n) + contact_size(team.n))
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(team.cable_lengths * (1.0 + tensions / self.stiffness))
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
-        """Straight cables, as long as the tensions that hold the load make them."""
+        """Straight cables, as long as the tensions that hold the load make them; slack ones lie in a level arc."""
         memory = super().initial(team, start)
         k, first = self.bead_count, state_size(team.n)
         drones = memory[LOAD:first].reshape(team.n, 1, DRONE)
         beads = memory[first : first + BEAD * k * team.n].reshape(team.n, k, BEAD)
-        down = np.arange(1, k + 1)[:, None] / (k + 1)
-        beads[:] = (1.0 - down) * drones[:, :, :BEAD] + down * memory[:LOAD]
+        if start.places is None:
+            down = np.arange(1, k + 1)[:, None] / (k + 1)
+            beads[:] = (1.0 - down) * drones[:, :, :BEAD] + down * memory[:LOAD]
+        else:
+            ends = zip(start.places, team.cable_lengths, strict=True)
+            beads[:, :, :3] = [level_arc(a, start.load_position, length, k) for a, length in ends]
         return memory
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
@@ -313,4 +378,6 @@ class ChainPart(BodiesPart):
 
 def _team_size(memory: Vector, width: int) -> int:
     """Drones whose memory this is, with ``width`` numbers for the beads of each."""
-    return (memory.size - 4 * LOAD) // (4 * (DRONE + width) + SCRATCH.size(1))
+    once = 4 * LOAD + contact_size(0)
+    each = 4 * (DRONE + width) + SCRATCH.size(1) + contact_size(1) - contact_size(0)
+    return (memory.size - once) // each

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from colift.kernel.jit import inline
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, free_motion, line, normalise
+from colift.world.plant._contact import P, touch
 
 
 @inline
@@ -103,12 +104,14 @@ def demand(n, y, dy, alpha, b):  # type: ignore[no-untyped-def]
 
 
 @inline
-def derivative(n, y, thrusts, torques, external, held, params, T, alpha, b, dy):  # type: ignore[no-untyped-def]
-    """Time derivative of the state under the held cables; fills the tensions ``T``.
+def derivative(n, y, thrusts, torques, external, held, anchors, w, params, T, alpha, b, forces, dy):  # type: ignore[no-untyped-def]
+    """Time derivative of the state under the held cables; fills the tensions ``T`` and the ground's ``forces``.
 
     ``alpha`` (3 numbers a drone) and ``b`` (one) are for intermediate results.
     """
     free_motion(n, y, thrusts, torques, external, params, dy)
+    if params[P.ground] > 0.0:
+        touch(n, y, anchors, w, params, forces, dy)
     lines(n, y, alpha, b)
     demand(n, y, dy, alpha, b)
     solve(n, alpha, b, held, params, T)

@@ -51,6 +51,8 @@ class Start:
     load_velocity: NDArray[np.float64]
     directions: NDArray[np.float64]
     attitudes: NDArray[np.float64]
+    places: NDArray[np.float64] | None = None
+    """Of the drones (n, 3), world, m, where their cables may be slack; None where they are taut along the ``directions``."""
 
 
 class PlantPart(Part):
@@ -58,6 +60,8 @@ class PlantPart(Part):
 
     layer: ClassVar[str] = "plant"
     observe: ClassVar[Callable[..., Any]]
+    slackens: ClassVar[bool] = True
+    """Whether its cables can go slack, and so be slack at the start."""
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
         """Memory vector for the start state."""

@@ -3,7 +3,8 @@
 Drones are free bodies, the load is a point on three slides, a cable is a spatial tendon with an upper limit of its
 length between the two. MuJoCo keeps the limit as a soft constraint whose error decays with ``time_constant``; force and
 stretch of a limit at rest follow from ``impedance`` (MuJoCo documentation, "Solver parameters"). A cut cable is a tendon
-whose limit is off. Integrated by MuJoCo's Runge-Kutta method of order four.
+whose limit is off. The ground is a plane that touches a grain at the load and four at each drone, its feet, with the rate and
+damping of ours (:mod:`colift.world.plant._contact`) and MuJoCo's own friction. Integrated by MuJoCo's Runge-Kutta method of order four.
 """
 
 from __future__ import annotations
@@ -19,9 +20,15 @@ from pydantic import Field
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
+from colift.world.plant._contact import RATE
 
 SETTINGS = 4
 """Parameters after those of the bodies: time constant, damping ratio, impedance, substeps."""
+
+
+GRAIN = 1e-3
+"""Radius of what touches the ground, m; the plane lies as much lower."""
+FEET = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 class _Scene(NamedTuple):
@@ -29,6 +36,7 @@ class _Scene(NamedTuple):
     data: Any  # scratch: every step writes the whole state first
     qpos: NDArray[np.int64]  # where MuJoCo's positions stand in our state
     qvel: NDArray[np.int64]
+    body: NDArray[np.int64]  # of each geometry, as in the ground's forces; of the plane none
 
 
 def _text(*numbers: float) -> str:
@@ -37,18 +45,27 @@ def _text(*numbers: float) -> str:
 
 def model_xml(params: Vector) -> str:
     """MJCF of load, drones and cables."""
-    load_mass, gravity = params[:MASS]
+    load_mass, gravity, grounded, height, friction, damping = params[:MASS]
     bodies = params[MASS:-SETTINGS].reshape(-1, BODY)
     time_constant, damping_ratio, impedance = params[-SETTINGS:-1]
     limit = (
         f'limited="true" solreflimit="{_text(time_constant, damping_ratio)}" '
         f'solimplimit="{_text(impedance, impedance, 1.0)}"'
     )
+    grain, plane = "", ""
+    if grounded:
+        contact = (
+            f'solref="{_text(-(RATE**2), -2.0 * damping * RATE)}" solimp="0.9999 0.9999 1 0.5 1" '
+            f'friction="{_text(friction, 0.0, 0.0)}" condim="3"'
+        )
+        grain = f'<geom size="{_text(GRAIN)}" mass="0" conaffinity="0" {contact} pos="'
+        plane = f'<geom type="plane" size="1 1 1" pos="0 0 {_text(height - GRAIN)}" contype="0" {contact}/>'
     drones, cables, motors = [], [], []
-    for i, (mass, length, *inertia) in enumerate(bodies):
+    for i, (mass, length, *inertia, foot) in enumerate(bodies):
+        feet = [f'{grain}{_text(x * foot, y * foot, 0.0)}"/>' for x, y in FEET if grain]
         drones.append(
             f'<body pos="0 0 {_text(length)}"><freejoint/><inertial pos="0 0 0" mass="{_text(mass)}" '
-            f'diaginertia="{_text(*inertia)}"/><site name="{i}"/></body>'
+            f'diaginertia="{_text(*inertia)}"/>{"".join(feet)}<site name="{i}"/></body>'
         )
         cables.append(
             f'<spatial {limit} range="0 {_text(length)}"><site site="{i}"/>'
@@ -56,10 +73,11 @@ def model_xml(params: Vector) -> str:
         )
         motors += [f'<motor site="{i}" gear="{_text(*row)}"/>' for row in np.eye(6)[[2, 3, 4, 5]]]
     slides = "".join(f'<joint type="slide" axis="{_text(*axis)}"/>' for axis in np.eye(3))
+    load = f'{grain}0 0 0"/>' if grain else ""
     return f"""<mujoco><option integrator="RK4" gravity="0 0 {_text(-gravity)}">
 <flag autoreset="disable"/></option>
-<worldbody><body>{slides}<inertial pos="0 0 0" mass="{_text(load_mass)}" diaginertia="1 1 1"/>
-<site name="load"/></body>{"".join(drones)}</worldbody>
+<worldbody>{plane}<body>{slides}<inertial pos="0 0 0" mass="{_text(load_mass)}" diaginertia="1 1 1"/>
+{load}<site name="load"/></body>{"".join(drones)}</worldbody>
 <tendon>{"".join(cables)}</tendon><actuator>{"".join(motors)}</actuator></mujoco>"""
 
 
@@ -75,6 +93,7 @@ def _scene(params: bytes) -> _Scene:
         data=mujoco.MjData(model),
         qpos=np.append(np.arange(3), drones + np.array([0, 1, 2, 6, 7, 8, 9])),
         qvel=np.append(np.arange(3, LOAD), drones + np.array([3, 4, 5, 10, 11, 12])),
+        body=model.geom_bodyid - 2,
     )
 
 
@@ -107,6 +126,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
     for substep in range(substeps):
         mujoco.mj_forward(model, data)
+        pressed = _contacts(scene, writes.ground_forces if substep == 0 else np.zeros((n + 1, 3)))
         limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
         pulls = np.zeros(n)
         pulls[data.efc_id[limits]] = data.efc_force[limits]
@@ -117,7 +137,13 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         holds, taut = attached > 0.0, data.ten_length > model.tendon_range[:, 1]
         np.maximum(catch_impulses, reduced * parting, out=catch_impulses, where=holds & taut)
         parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity, 0.0), 0.0)
+        sinking = -np.append(data.qvel[5::6], data.qvel[2])
         mujoco.mj_step(model, data)
+        if model.ngeom:
+            np.maximum(
+                writes.touch_speeds, sinking, out=writes.touch_speeds,
+                where=~pressed & _contacts(scene, np.zeros((n + 1, 3))),
+            )  # fmt: skip
     state[scene.qpos] = data.qpos
     state[scene.qvel] = data.qvel
     warm_start[:] = data.qacc_warmstart
@@ -126,10 +152,25 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         state[:] = np.nan
 
 
+def _contacts(scene: _Scene, forces: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of drones and, last, load (n + 1,) touch the ground now; fills its forces on them (n + 1, 3), N."""
+    import mujoco
+
+    forces[:], touching = 0.0, np.zeros(len(forces), dtype=bool)
+    for k, contact in enumerate(scene.data.contact):
+        body = scene.body[contact.geom2]
+        force = np.zeros(6)
+        mujoco.mj_contactForce(scene.model, scene.data, k, force)
+        forces[body] += force[:3] @ contact.frame.reshape(3, 3)
+        touching[body] |= contact.dist < 0.0
+    return touching
+
+
 class Mujoco(BodiesPart):
     """MuJoCo: rigid bodies, and tendons with a soft limit of their length for cables."""
 
     kernel = _step
+    anchored = False
     needs = ("mujoco", "mujoco")
 
     time_constant: Annotated[float, Field(ge=1e-4, le=1.0)] = 0.002

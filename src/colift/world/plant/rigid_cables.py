@@ -21,6 +21,7 @@ from colift.world.plant._bodies import (
     runge_kutta,
     state_size,
 )
+from colift.world.plant._contact import P, anchors_of, contact_size, rate, settle, spare_of
 from colift.world.plant._rigid import derivative, project
 from colift.world.plant.base import STEP_SIGNATURE
 
@@ -44,16 +45,35 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     T = column(memory, 4 * size, n, SPANS.T)
     b = column(memory, 4 * size, n, SPANS.b)
     alpha = column(memory, 4 * size, n, SPANS.alpha)
+    anchors, w, forces = anchors_of(memory, n), rate(dt), writes.ground_forces
     for k in range(size):
         begin[k] = y[k]
     for stage in range(4):
-        derivative(n, y, thrusts, torques, external, attached, params, T, alpha, b, slope)
+        derivative(
+            n,
+            y,
+            thrusts,
+            torques,
+            external,
+            attached,
+            anchors,
+            w,
+            params,
+            T,
+            alpha,
+            b,
+            forces,
+            slope,
+        )
         runge_kutta(stage, size, dt, begin, slope, total, y)
         if stage == 0:
             for i in range(n):
                 tensions[i] = T[i]
             raise_peaks(n, T, peak_tensions)
+            forces = spare_of(memory, n)
     project(n, y, attached, params, T, alpha, b)
+    if params[P.ground] > 0.0:
+        settle(n, begin, y, w, params, anchors, writes.touch_speeds)
     for i in range(n):
         if tensions[i] < 0.0:
             slack_times[i] += dt
@@ -63,6 +83,7 @@ class RigidCables(BodiesPart):
     """Rigid massless cables that would push rather than go slack, point load; no settings."""
 
     kernel = _step
+    slackens = False
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * state_size(team.n) + SCRATCH.size(team.n))
+        return np.zeros(4 * state_size(team.n) + SCRATCH.size(team.n) + contact_size(team.n))

@@ -32,6 +32,15 @@ from colift.world.plant._bodies import (
     runge_kutta,
     state_size,
 )
+from colift.world.plant._contact import (
+    P,
+    anchors_of,
+    contact_size,
+    rate,
+    settle,
+    spare_of,
+    touch,
+)
 from colift.world.plant._rigid import (
     closing,
     demand,
@@ -160,6 +169,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     T, b = column(memory, 4 * size, n, SPANS.T), column(memory, 4 * size, n, SPANS.b)
     taut, held = column(memory, 4 * size, n, SPANS.taut), column(memory, 4 * size, n, SPANS.held)
     alpha, parting = column(memory, 4 * size, n, SPANS.alpha), memory[4 * size + n * S.parting :]
+    anchors, w, spare = anchors_of(memory, n), rate(dt), spare_of(memory, n)
     note_parting(n, y, dt, parting)
     left = dt
     for event in range(EVENTS * n + 1):
@@ -167,6 +177,9 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         slow = math.inf if last else SLOW
         catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses)
         free_motion(n, y, thrusts, torques, external, params, slope)
+        if params[P.ground] > 0.0:
+            forces = writes.ground_forces if event == 0 else spare
+            touch(n, y, anchors, w, params, forces, slope)
         lines(n, y, alpha, b)
         demand(n, y, slope, alpha, b)
         complementarity(n, alpha, b, taut, params, held, T)
@@ -181,7 +194,10 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             for k in range(size):
                 y[k] = begin[k]
             for stage in range(5):  # the fifth looks at the tensions of the end
-                derivative(n, y, thrusts, torques, external, held, params, T, alpha, b, slope)
+                derivative(
+                    n, y, thrusts, torques, external, held, anchors, w, params, T, alpha, b, spare,
+                    slope,
+                )  # fmt: skip
                 if stage < 4:
                     runge_kutta(stage, size, h, begin, slope, total, y)
             happened = False
@@ -202,6 +218,8 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 low = h
             h = high if trial == BISECTIONS - 1 else 0.5 * (low + high)
         project(n, y, held, params, T, alpha, b)
+        if params[P.ground] > 0.0:
+            settle(n, begin, y, w, params, anchors, writes.touch_speeds)
         for i in range(n):
             if attached[i] > 0.0 and held[i] == 0.0:
                 slack_times[i] += high
@@ -216,4 +234,4 @@ class SlackCables(BodiesPart):
     kernel = _step
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(4 * state_size(team.n) + SCRATCH.size(team.n) + 1)
+        return np.zeros(4 * state_size(team.n) + SCRATCH.size(team.n) + 1 + contact_size(team.n))
