@@ -49,7 +49,7 @@ def test_with_the_papers_controllers_it_grows_to_metres_and_is_no_pass(name):
 def test_a_load_let_go_on_the_ground_was_set_down():
     """Led down to the ground by 6 s, released at 7 s: it lies there, and the drones fly on."""
     run = fly("s01b_land_release")
-    assert run.verdict.level == "pass"
+    assert run.verdict.ok
     assert run.metrics["touch_speed_mps"] < 0.3
     assert np.abs(run.recording["load"][-1, 1]).max() < 1e-6
     assert run.recording["load"][-1, 0, 2] == pytest.approx(0.0, abs=1e-3)
@@ -77,7 +77,8 @@ def test_a_load_let_go_without_ground_falls_for_ever():
 def test_a_team_that_cannot_take_off_is_no_pass():
     """Without anything that leads it through the take-off."""
     run = fly("s01_takeoff_ground")
-    assert run.metrics["min_height_m"] > -0.01
+    # A load that falls with v presses itself in by v / (e w), and no deeper.
+    assert run.metrics["min_height_m"] > -0.001 - run.metrics["touch_speed_mps"] / (np.e * 300.0)
     assert run.verdict.level in {"fail", "lost"}
 
 
