@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -537,6 +538,19 @@ class Frame(Section):
         return np.asarray(load + self.start.spread * self.team.cable_lengths[drones, None] * level)
 
 
+def with_derived(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A resolved mission with what is derived put into its sections; these are copied as far as they change."""
+    found = {name: section for name, section in table.items() if name != "derived"}
+    for path, value in table.get("derived", {}).items():
+        section, *places, leaf = path.split(".")
+        node = found[section] = copy.copy(found.get(section, {}))
+        for place in places:
+            node[int(place)] = copy.copy(node[int(place)])
+            node = node[int(place)]
+        node[leaf] = value
+    return found
+
+
 class Described(Frame):
     """What a recording can tell of its mission: the frame, and by name what flew it."""
 
@@ -553,6 +567,10 @@ class Described(Frame):
     def resolved(self) -> dict[str, Any]:
         """All that is known, as plain data."""
         return self.model_dump(mode="json", exclude_none=True)
+
+    def settings(self) -> dict[str, Any]:
+        """The same with what is derived in the sections where it counts: to look up, not to fly again."""
+        return with_derived(self.resolved())
 
 
 class RealFlight(Described):

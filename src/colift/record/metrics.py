@@ -166,7 +166,7 @@ def min_drone_distance_m(r: Recording) -> float:
 
 @_metric
 def min_downwash_distance_m(r: Recording) -> float:
-    downwash = r.mission.resolved().get("allocation", {}).get("downwash")
+    downwash = r.mission.settings().get("allocation", {}).get("downwash")
     if downwash is None:  # nothing is asked for above each other
         return float("nan")
     return _nearest_drones(r["positions"] / [1.0, 1.0, float(downwash)])
@@ -213,7 +213,7 @@ def peak_thrust_fraction(r: Recording) -> float:
 
 def thrust_limits(recording: Recording) -> NDArray[np.float64] | None:
     """The most that each drone can give (n,), N: by its motors, its vehicle, or its allocator's limit; None if unlimited."""
-    settings = recording.mission.resolved()
+    settings = recording.mission.settings()
     motor = settings.get("actuation", {}).get("max_thrust")
     drone = settings.get("drones", {}).get("max_thrust")
     if drone is None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ConfigDict, Field, ValidationError
 
 from colift.catalogue import LISTS
-from colift.mission.schema import Described, Event, Frame, Section
+from colift.mission.schema import Described, Event, Frame, Section, with_derived
 
 UNNAMED = "a flight"
 
@@ -50,7 +50,7 @@ class RecordedMission(Described):
 
         def __getattr__(self, name: str) -> Any:
             """Sections of the layers: their settings as attributes, such as ``mission.allocation.mu``."""
-            table = self.__dict__.get("table", {})
+            table = with_derived(self.__dict__.get("table", {}))
             if name in table or name in LISTS:
                 return _as_attributes(table.get(name, []))
             return super().__getattr__(name)
@@ -79,6 +79,7 @@ def _kinds(table: Mapping[str, Any]) -> Iterable[tuple[str, str | list[str]]]:
 
 def _understood(table: Mapping[str, Any], drones: int) -> Frame:
     """The frame without what it does not take."""
+    table = with_derived(table)
     kept = copy.deepcopy({k: v for k, v in table.items() if k in Frame.model_fields})
     kept.setdefault("name", UNNAMED)
     events = [event for event in map(_event, _listed(kept.pop("events", []))) if event]
