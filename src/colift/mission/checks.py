@@ -8,9 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from colift.control.allocation.base import AllocatorPart
+from colift.control.allocation.base import Allocation, AllocatorPart
 from colift.control.allocation.limits.hover import hover_conflicts
 from colift.errors import Problem, UnknownNameError
 from colift.kernel.ports import MAX_DISTURBANCES
@@ -20,10 +21,12 @@ from colift.mission.forecast import forecast
 from colift.mission.grounding import ground_checks
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
-from colift.team import contact
+from colift.team import Team, contact
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
+
+Array = NDArray[np.float64]
 
 MAX_RECORDING = 4e9
 """Bytes that a flight may record; it is held in memory."""
@@ -175,6 +178,22 @@ def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
         yield Problem(f"start.{field}", value, message.replace("touched", "touch"))
 
 
+def hovering(
+    team: Team, allocation: AllocatorPart, thrusts: Array, directions: Array, period: float
+) -> tuple[Allocation, dict[str, str]]:
+    """A team in hover as its allocator settles it from ``directions`` (n, 3), and by layer why that does not hold the load.
+
+    ``thrusts`` (n,): what the motors of each drone give, N; ``period`` of the allocator, s.
+    """
+    hover = allocation.hover(team, directions, period)
+    conflicts = hover_conflicts(team, hover, thrusts)
+    if "allocation" in conflicts:
+        steep = allocation.with_any_thrust(team).hover(team, directions, period)
+        weak = hover_conflicts(team, steep, thrusts)
+        conflicts = weak if "actuation" in weak else conflicts
+    return hover, conflicts
+
+
 def hover_checks(
     frame: Frame, parts: Mapping[str, Part], disturbances: Sequence[Part]
 ) -> Iterable[Problem]:
@@ -193,12 +212,7 @@ def hover_checks(
     unlimited = bool(np.isinf(thrusts).all())
     if team.gravity == 0.0 or (unlimited and not allocation.cannot_hold(team, thrusts, directions)):
         return
-    hover = allocation.hover(team, directions, frame.timing.allocation)
-    conflicts = hover_conflicts(team, hover, thrusts)
-    if "allocation" in conflicts:
-        steep = allocation.with_any_thrust(team).hover(team, directions, frame.timing.allocation)
-        weak = hover_conflicts(team, steep, thrusts)
-        conflicts = weak if "actuation" in weak else conflicts
+    hover, conflicts = hovering(team, allocation, thrusts, directions, frame.timing.allocation)
     if not conflicts:
         bound = frame.criteria.get("tracking_max_m")
         allowed = math.inf if bound is None or bound.max is None else bound.max

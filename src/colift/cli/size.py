@@ -1,0 +1,237 @@
+"""`colift size`: how much these drones carry, how many a load takes, for how long, and what if one is lost."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from colift.cli.base import (
+    EXIT_ERROR,
+    Json,
+    Sets,
+    With,
+    app,
+    emit,
+    load_parts,
+    loading,
+    out,
+    progress,
+    show_notes,
+    show_tables,
+)
+from colift.errors import MissionError, Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from colift.study.size import Answer, Flown, Judgement, Most, Question
+
+Name = Annotated[
+    str | None,
+    typer.Argument(help="Shipped mission or TOML file to take drones, load, wind and limits from."),
+]
+Vehicle = Annotated[
+    str | None, typer.Option(help="A known drone, or a TOML file with its numbers.")
+]
+Drones = Annotated[
+    int | None,
+    typer.Option(help="How many drones.", show_default="as many as the load takes", min=1, max=64),
+]
+Cable = Annotated[float | None, typer.Option(help="Length of each cable, m.", show_default="1")]
+Load = Annotated[float | None, typer.Option(help="Load, kg.", show_default="the heaviest")]
+Wind = Annotated[
+    float | None,
+    typer.Option(
+        help="Mean wind, m/s, with its turbulence and gusts.", show_default="none, or the mission's",
+        min=0.0, max=60.0,
+    ),
+]  # fmt: skip
+AtMost = Annotated[int, typer.Option(help="Most drones that are looked for.", min=1, max=64)]
+Mass = Annotated[float | None, typer.Option(help="Of a drone with battery, kg.")]
+Thrust = Annotated[float | None, typer.Option(help="Largest thrust of a drone, N.")]
+Arm = Annotated[float | None, typer.Option(help="From the centre to a rotor's axis, m.")]
+Radius = Annotated[float | None, typer.Option(help="From the centre to the outermost tip, m.")]
+RotorRadius = Annotated[float | None, typer.Option(help="Of one rotor, m.")]
+Rotors = Annotated[int | None, typer.Option(help="Number of rotors: 4, 6 or 8.")]
+MotorLag = Annotated[float | None, typer.Option(help="Time constant of the motors' thrust, s.")]
+Energy = Annotated[float | None, typer.Option(help="Of a full battery, J (3600 J are 1 Wh).")]
+Efficiency = Annotated[
+    float | None, typer.Option(help="Ideal power of the rotors in hover over the battery's.")
+]
+Fly = Annotated[bool, typer.Option("--fly", help="Fly it as well, each drone's cable cut, too.")]
+Seeds = Annotated[int, typer.Option(help="Flights of each case.", min=1, max=10_000)]
+
+
+@app.command()
+def size(
+    mission: Name = None,
+    vehicle: Vehicle = None,
+    drones: Drones = None,
+    cable: Cable = None,
+    load: Load = None,
+    wind: Wind = None,
+    at_most: AtMost = 12,
+    mass: Mass = None,
+    max_thrust: Thrust = None,
+    arm: Arm = None,
+    radius: Radius = None,
+    rotor_radius: RotorRadius = None,
+    rotors: Rotors = None,
+    motor_lag: MotorLag = None,
+    energy: Energy = None,
+    efficiency: Efficiency = None,
+    flown: Fly = False,
+    seeds: Seeds = 20,
+    sets: Sets = None,
+    extra: With = None,
+    as_json: Json = False,
+) -> None:
+    """How much these drones carry, how many a load takes, for how long, and what if one is lost.
+
+    Judged by optimisation, in calm air and in the wind, with all drones and with the worst one lost and the others planned
+    anew; with --fly also flown. Exit code 1 if the load (or, without one, any load) is not carried.
+
+    [bold]Examples[/bold]
+
+      colift size --mass 1.4 --max-thrust 28 --drones 3 --cable 2 --load 1.2 --wind 8
+      colift size --mass 1.4 --max-thrust 28 --cable 2 --load 5
+      colift size --vehicle x500 --drones 4 --cable 2 --fly
+      colift size my-mission.toml
+    """
+    from colift.mission.load import parse_overrides
+
+    numbers = {
+        "vehicle": vehicle, "cable_length": cable, "mass": mass, "max_thrust": max_thrust, "arm": arm, "radius": radius,
+        "rotor_radius": rotor_radius, "rotors": rotors, "motor_lag": motor_lag, "energy": energy,
+        "efficiency": efficiency,
+    }  # fmt: skip
+    numbers = {name: value for name, value in numbers.items() if value is not None}
+    if mission is None:
+        _enough(numbers, drones, load)
+    with loading():
+        from colift.study import size as study
+
+        load_parts(extra)
+        changes = parse_overrides(sets)
+        source: Any = mission
+        if mission is None:
+            source, wind = {**study.BASE, "drones": numbers}, wind or 0.0
+        else:
+            changes = {f"drones.{name}": value for name, value in numbers.items()} | changes
+        question = study.Question(source, changes, drones, load, wind, at_most)
+        answer = study.size(question)
+    flights: list[Flown] = []
+    if flown:
+        with progress("Flying") as advance:
+            flights = study.fly(question, answer, seeds, advance)
+    notes = [f"{path} {message}" for path, message in study.notes(answer)]
+    if as_json:
+        emit({**study.as_json(question, answer, flights), "notes": notes})
+    else:
+        _say(question, answer, flights)
+        show_notes(notes)
+    if not answer.ok:
+        raise typer.Exit(EXIT_ERROR)
+
+
+def _enough(numbers: Mapping[str, Any], drones: int | None, load: float | None) -> None:
+    """Refuse a question that names no drone, or neither number nor load."""
+    problems = []
+    if not {"vehicle", "mass"} & numbers.keys():
+        problems.append(
+            Problem("--vehicle", "", "is required, or --mass with --max-thrust, or a mission")
+        )
+    if drones is None and load is None:
+        problems.append(
+            Problem("--drones", "", "is required, or --load, for which they are counted")
+        )
+    if problems:
+        raise MissionError("size", problems)
+
+
+def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
+    from colift.kernel.math import shares
+    from colift.study import size as study
+
+    crew, n = answer.crew, answer.crew.team.n
+    team = crew.team
+    windy = answer.wind > 0.0
+    airs = ["calm", "wind"] if windy else ["calm"]
+    out.print(
+        f"{n} drone{'s' * (n > 1)} of {_range(team.masses)} kg with {_range(answer.held.limits)} N each, "
+        f"cables of {_range(team.cable_lengths)} m"
+        + (f", wind of up to {answer.wind:.3g} m/s that lasts" if windy else ", calm air"),
+        highlight=False,
+    )
+
+    def heaviest(found: Most) -> list[str]:
+        return ["none" if found.load == 0.0 else f"{found.load:.2f} kg", found.limit]
+
+    rows = []
+    for air in airs:
+        where = "in the wind" if air == "wind" else "in calm air"
+        rows.append([where, "no", *heaviest(answer.most[air])])
+        rows.append([where, "the worst one", *heaviest(answer.most_spare[air])])
+    show_tables([("Heaviest load", ["air", "drone lost", "carried", "limit"], rows)])
+    load, asked = team.load_mass, answer.asked is not None
+    if answer.held.ok or asked:
+        what = f"{load:.4g} kg" + ("" if asked else ", the heaviest")
+        title = f"{what}{', in the wind' if windy else ''}"
+        rows = [
+            ["no", *_held(answer.held), _minutes(study.lasts(answer, lost=False))],
+            ["the worst one", *_held(answer.held_spare), _minutes(study.lasts(answer, lost=True))],
+        ]
+        head = ["drone lost", "carried", "most thrust", "in the wind", "hover, min"]
+        if not windy:
+            head.pop(3)
+            rows = [[*row[:3], row[4]] for row in rows]
+        show_tables([(title, head, rows)])
+        for found, who in ((answer.held, "all drones"), (answer.held_spare, "one lost")):
+            if found.message:
+                out.print(f"{who}: {escape(found.message)}", highlight=False)
+    if asked and crew.alike:
+
+        def many(found: int | None) -> str:
+            return f"{found}" if found is not None else f"more than {question.at_most}"
+
+        out.print(
+            f"Fewest drones for {load:.4g} kg{' in this wind' if windy else ''}: {many(answer.few)}; "
+            f"if one may be lost: {many(answer.few_spare)}.",
+            highlight=False,
+        )
+    for line in study.remarks(answer):
+        out.print(escape(line), highlight=False)
+    if flights:
+        rows = [
+            [
+                each.reference, "each drone's" if each.cut else "none",
+                shares.text(each.good, each.flights), each.first_bad or "-",
+            ]
+            for each in flights
+        ]  # fmt: skip
+        show_tables([("Flown", ["reference", "cable cut", "good", "first that was not"], rows)])
+
+
+def _held(found: Judgement) -> list[str]:
+    """Whether a load is carried, and the drone's thrust that is nearest its limit, in hover and in the wind."""
+    cells = ["yes" if found.ok else "no"]
+    for thrusts in (found.thrusts, found.in_wind):
+        share = thrusts / found.limits
+        if len(share) == 0 or not math.isfinite(float(share.max())):
+            cells.append("-")
+        else:
+            i = int(share.argmax())
+            cells.append(f"{thrusts[i]:.3g} of {found.limits[i]:.3g} N")
+    return cells
+
+
+def _minutes(seconds: float) -> str:
+    return "not known" if math.isnan(seconds) else f"{seconds / 60.0:.1f}"
+
+
+def _range(values: Any) -> str:
+    low, high = float(min(values)), float(max(values))
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
