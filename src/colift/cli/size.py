@@ -124,7 +124,7 @@ def size(
         question = study.Question(source, changes, drones, load, wind, at_most)
         answer = study.size(question)
     flights: list[Flown] = []
-    if flown:
+    if flown and (answer.held.ok or answer.asked is not None):
         with progress("Flying") as advance:
             flights = study.fly(question, answer, seeds, advance)
     notes = [f"{path} {message}" for path, message in study.notes(answer)]
@@ -159,9 +159,14 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
     crew, n = answer.crew, answer.crew.team.n
     team = crew.team
     windy = answer.wind > 0.0
+    most = (
+        f" with {_range(answer.held.limits)} N each"
+        if math.isfinite(answer.held.limits.max())
+        else ""
+    )
     airs = ["calm", "wind"] if windy else ["calm"]
     out.print(
-        f"{n} drone{'s' * (n > 1)} of {_range(team.masses)} kg with {_range(answer.held.limits)} N each, "
+        f"{n} drone{'s' * (n > 1)} of {_range(team.masses)} kg{most}, "
         f"cables of {_range(team.cable_lengths)} m"
         + (f", wind of up to {answer.wind:.3g} m/s that lasts" if windy else ", calm air"),
         highlight=False,
@@ -176,13 +181,19 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
         rows.append([where, "no", *heaviest(answer.most[air])])
         rows.append([where, "the worst one", *heaviest(answer.most_spare[air])])
     show_tables([("Heaviest load", ["air", "drone lost", "carried", "limit"], rows)])
+    if answer.most["calm"].load == 0.0 and answer.asked is None:
+        out.print(escape(answer.most["calm"].message), highlight=False)
     load, asked = team.load_mass, answer.asked is not None
     if answer.held.ok or asked:
         what = f"{load:.4g} kg" + ("" if asked else ", the heaviest")
         title = f"{what}{', in the wind' if windy else ''}"
         rows = [
-            ["no", *_held(answer.held), _minutes(study.lasts(answer, lost=False))],
-            ["the worst one", *_held(answer.held_spare), _minutes(study.lasts(answer, lost=True))],
+            ["no", *_held(answer.held), _minutes(study.lasts(crew, answer.held))],
+            [
+                "the worst one",
+                *_held(answer.held_spare),
+                _minutes(study.lasts(answer.others, answer.held_spare)),
+            ],
         ]
         head = ["drone lost", "carried", "most thrust", "in the wind", "hover, min"]
         if not windy:
@@ -220,11 +231,12 @@ def _held(found: Judgement) -> list[str]:
     cells = ["yes" if found.ok else "no"]
     for thrusts in (found.thrusts, found.in_wind):
         share = thrusts / found.limits
-        if len(share) == 0 or not math.isfinite(float(share.max())):
+        if len(share) == 0 or math.isnan(float(share.max())):
             cells.append("-")
         else:
             i = int(share.argmax())
-            cells.append(f"{thrusts[i]:.3g} of {found.limits[i]:.3g} N")
+            most = f" of {found.limits[i]:.3g}" if math.isfinite(found.limits[i]) else ""
+            cells.append(f"{thrusts[i]:.3g}{most} N")
     return cells
 
 

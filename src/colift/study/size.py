@@ -56,8 +56,8 @@ BASE: dict[str, Any] = {"name": "size", "reference": {"kind": "hover"}}
 """The mission of drones that are given without one: everything else follows from the bodies."""
 
 NAMES = {
-    "max_thrust": "thrust of the motors, with tilted cables",
-    "motor": "thrust of the motors, with tilted cables",
+    "max_thrust": "thrust of the motors on tilted cables",
+    "motor": "thrust of the motors on tilted cables",
     "radius": "distance between drones and cables (their radius)",
     "tension_max": "largest tension of a cable",
     "tension_min": "least tension of a cable",
@@ -87,7 +87,7 @@ class Judgement:
     thrusts : (n,) array
         Of each drone in hover, N.
     in_wind : (n,) array
-        What each needs in the strongest wind that lasts, N; in calm air the same.
+        What each needs in the strongest wind that lasts, N; in calm air the same. Both NaN where hover fails already.
     limits : (n,) array
         What the motors of each give, N.
     lean : float
@@ -210,14 +210,14 @@ class Crew:
         hover, conflicts = self.settled()
         thrusts = team.hover_thrusts(hover.tensions, hover.directions)
         ahead = forecast(team, hover, limits, self.disturbances, self.attitude)
-        limit = message = ""
         for layer, said in conflicts.items():
-            limit, message = NAMES["max_thrust"] if layer == "actuation" else "", said
-        if not conflicts:
-            for layer, said in ahead.problems(team, self.allowed):
-                limit, message = IN_WIND[layer], said
-                break
-        return Judgement(not message, limit, message, thrusts, ahead.thrusts, limits, ahead.lean)
+            limit = NAMES["max_thrust"] if layer == "actuation" else ""
+            return Judgement(False, limit, said, none, none, limits, math.nan)
+        for layer, said in ahead.problems(team, self.allowed):
+            return Judgement(
+                False, IN_WIND[layer], said, thrusts, ahead.thrusts, limits, ahead.lean
+            )
+        return Judgement(True, "", "", thrusts, ahead.thrusts, limits, ahead.lean)
 
     def heaviest(self) -> Most:
         """The heaviest load that is carried, and what is in the way of more.
@@ -244,7 +244,7 @@ class Crew:
         if ok > 0.0:
             best = feasibility(self.carrying(ok).team, self.allocation, self.actuation)
             binding, optimum = best.binding, best.heaviest / self.team.gravity
-        limit = above.limit or ", ".join(_named(each) for each in binding[:2])
+        limit = above.limit or " and ".join(_named(each) for each in binding[:2])
         return Most(ok, limit, above.message, binding, optimum)
 
 
@@ -295,26 +295,29 @@ def spared(crew: Crew) -> Most:
     return min(found, key=lambda each: each.load)
 
 
-def carries(crew: Crew, *, spare: bool = False) -> Judgement:
-    """Whether a load is carried; with ``spare`` also by the others, whichever drone is lost."""
-    found = crew.judge()
-    if found.ok and spare:
-        others = [each.judge() for _, each in crew.left()]
-        if not others:
-            return replace(
-                found, ok=False, message="without its only drone nothing carries the load"
-            )
-        return next((each for each in others if not each.ok), others[0])
-    return found
+def worst_loss(crew: Crew) -> tuple[int, Crew, Judgement] | None:
+    """The drone whose loss is the worst for the load, the others, and how they carry it; None for a single drone."""
+    found = [(lost, others, others.judge()) for lost, others in crew.left()]
+
+    def badness(each: tuple[int, Crew, Judgement]) -> tuple[bool, float]:
+        share = float(np.max(each[2].in_wind / each[2].limits))
+        return (not each[2].ok, math.inf if math.isnan(share) else share)
+
+    return max(found, key=badness, default=None)
 
 
-def fewest(crew: Crew, at_most: int, *, spare: bool = False) -> int | None:
-    """How many drones like the first carry the load; None where ``at_most`` do not."""
-    for n in range(2 if spare else 1, at_most + 1):
+def fewest(crew: Crew, at_most: int) -> tuple[int | None, int | None]:
+    """How many drones like the first carry the load, and how many do so that one may be lost; None where ``at_most`` do not."""
+    few, before = None, False
+    for n in range(1, at_most + 1):
         some = crew.of([0] * n)
-        if some.ceiling >= some.team.load_mass and carries(some, spare=spare).ok:
-            return n
-    return None
+        held = some.ceiling >= some.team.load_mass and some.judge().ok
+        if held and few is None:
+            few = n
+        if held and before:
+            return few, n
+        before = held
+    return few, None
 
 
 def powers(team: Team, thrusts: Array) -> Array:
@@ -429,7 +432,11 @@ class Answer:
         Fewest drones like these for the load, in the wind, and if one may be lost; None: not within ``at_most``, not asked, or drones that
         are not alike.
     held, held_spare : Judgement
-        Of the load, in the wind.
+        Of the load, in the wind, and with the drone lost whose loss is the worst; what was a single drone has no team then.
+    others : Crew or None
+        Those that are left then.
+    lost : int or None
+        Which one that is.
     ok : bool
         Whether the load that was asked is carried; without one, whether any is.
 
@@ -445,6 +452,8 @@ class Answer:
     few_spare: int | None
     held: Judgement
     held_spare: Judgement
+    others: Crew | None
+    lost: int | None
     ok: bool
 
 
@@ -462,8 +471,7 @@ def size(question: Question) -> Answer:
     asked = question.load if question.only_drones else crew.team.load_mass
     few = few_spare = None
     if asked is not None and crew.alike:
-        few = fewest(crew, question.at_most)
-        few_spare = fewest(crew, question.at_most, spare=True)
+        few, few_spare = fewest(crew, question.at_most)
     if question.drones is None and question.only_drones:
         mission = question.mission(few_spare or few or question.at_most)
         crew = Crew.of_mission(mission)
@@ -474,73 +482,68 @@ def size(question: Question) -> Answer:
     most_spare["wind"] = spared(crew) if wind > 0.0 else most_spare["calm"]
     load = asked if asked is not None else most["wind"].load
     loaded = crew.carrying(load) if load > 0.0 else crew
-    held, held_spare = carries(loaded), carries(loaded, spare=True)
+    held, worst = loaded.judge(), worst_loss(loaded)
+    lost, others, held_spare = worst if worst else (None, None, _ALONE)
     return Answer(
-        mission, loaded, wind, asked, most, most_spare, few, few_spare, held, held_spare, held.ok
+        mission,
+        loaded,
+        wind,
+        asked,
+        most,
+        most_spare,
+        few,
+        few_spare,
+        held,
+        held_spare,
+        others,
+        lost,
+        held.ok,
     )
 
 
-def _worst(answer: Answer) -> tuple[int, Crew, Judgement] | None:
-    """The drone whose loss is the worst for the load, the others, and how they carry it; None for a single drone."""
-    found = [(lost, others, others.judge()) for lost, others in answer.crew.left()]
-    if not found:
-        return None
-
-    def badness(each: tuple[int, Crew, Judgement]) -> tuple[bool, float]:
-        share = float(np.max(each[2].in_wind / each[2].limits))
-        return (not each[2].ok, math.inf if math.isnan(share) else share)
-
-    return max(found, key=badness)
+_ALONE = Judgement(
+    False, NAMES["max_thrust"], "without its only drone nothing carries the load",
+    np.zeros(0), np.zeros(0), np.zeros(0), math.nan,
+)  # fmt: skip
+"""What is left of a single drone."""
 
 
-def lasts(answer: Answer, *, lost: bool) -> float:
-    """Time of hover with the load on full batteries until the first is empty, s; NaN: not known, or not carried."""
-    found, team = answer.held, answer.crew.team
-    if lost:
-        worst = _worst(answer)
-        if worst is None:
-            return math.nan
-        team, found = worst[1].team, worst[2]
-    return endurance(team, found.thrusts) if found.ok else math.nan
+def lasts(crew: Crew | None, held: Judgement) -> float:
+    """Time of hover in calm air from full batteries until the first is empty, s; NaN: not known, or the load is not carried."""
+    return endurance(crew.team, held.thrusts) if crew is not None and held.ok else math.nan
 
 
 def remarks(answer: Answer) -> list[str]:
     """What else must be known, in sentences."""
-    found, team = [], answer.crew.team
+    found, team, others = [], answer.crew.team, answer.others
     if missing := unknown(team):
         found.append(
             f"How long: not known without {', '.join(f'drones.{name}' for name in missing)}."
         )
     elif answer.held.ok:
         found.append(
-            "How long: in calm hover, from full batteries to the first that is empty; keep a reserve of your own."
+            "How long: in calm hover, from full batteries until the first is empty; keep a reserve of your own."
         )
-    worst = _worst(answer)
-    if worst is None:
+    if team.n > 1 and np.isnan(team.radii).any():
+        found.append(
+            "Distances in metres: not kept, drones.radius (or arm and rotor_radius) is not known."
+        )
+    if others is None:
         found.append("A single drone has no spare: if it is lost, the load falls.")
-        return found
-    _, others, judged = worst
-    weight = team.load_mass * team.gravity
-    if others.team.n == 1:
-        own = float(others.team.masses[0] * team.gravity)
+    elif others.team.n == 1:
+        need = float(others.team.masses[0] + team.load_mass) * team.gravity
+        able = "carries it, on a cable that swings" if answer.held_spare.ok else "does not carry it"
         found.append(
-            f"If one of the two is lost, the other must carry all: {own + weight:.4g} N in hover of the {judged.limits[0]:.4g} N that it has"
-            + (
-                " - it can, with the load straight below it, swinging as it will."
-                if judged.ok
-                else " - it cannot: the load falls."
-            )
+            f"If one of the two is lost, the other must hold {need:.4g} N in hover, of the {answer.held_spare.limits[0]:.4g} N that it has: "
+            f"it {able}."
         )
-    if others.team.n == 2 and judged.ok:
-        hover, _ = others.settled()
+    elif others.team.n == 2 and answer.held_spare.ok:
         found.append(
-            f"If one of the three is lost, the load hangs in the plane of two cables; across it, it swings freely with a period of "
-            f"{swing(others.team, hover):.2g} s until the drones have damped it."
+            "If one of the three is lost, the load hangs in the plane of two cables; across it, it swings as a pendulum with a period of "
+            f"{swing(others.team, others.settled()[0]):.2g} s, which only the drones' motion damps."
         )
     elif others.team.n == 2:
-        found.append(
-            "If one of the three is lost, the two that are left cannot hold the load, whatever they do."
-        )
+        found.append("If one of the three is lost, the two that are left do not carry the load.")
     return found
 
 
@@ -583,8 +586,8 @@ def as_json(question: Question, answer: Answer, flights: Iterable[Flown]) -> dic
             air: {"all": most(answer.most[air]), "one_lost": most(answer.most_spare[air])} for air in ("calm", "wind")
         },
         "load": {
-            "all": held(answer.held, lasts(answer, lost=False)),
-            "one_lost": held(answer.held_spare, lasts(answer, lost=True)),
+            "all": held(answer.held, lasts(answer.crew, answer.held)),
+            "one_lost": {"lost_drone": answer.lost} | held(answer.held_spare, lasts(answer.others, answer.held_spare)),
         },
         "fewest": {"all": answer.few, "one_lost": answer.few_spare, "at_most": question.at_most},
         "endurance_needs": unknown(team),
@@ -637,10 +640,12 @@ def fly(
 
     Nobody is told of a cut; detection has to find it. Winds that are asked by their speed blow to another side in each flight.
     """
-    n, found = answer.crew.team.n, []
-    cuts = [[None], *([list(range(n))] if n > 1 else [])]
-    total = len(SEEN) * seeds * sum(map(len, cuts))
-    done = 0
+    n, done = answer.crew.team.n, 0
+    found: list[Flown] = []
+    cuts: list[list[int | None]] = [[None]]
+    if n > 1:
+        cuts.append([*range(n)])
+    total = len(SEEN) * seeds * sum(len(drones) for drones in cuts)
     for drones in cuts:
         for reference in SEEN:
             good, flights, bad = 0, 0, ""
