@@ -183,6 +183,7 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
     show_tables([("Heaviest load", ["air", "drone lost", "carried", "limit"], rows)])
     if answer.most["calm"].load == 0.0 and answer.asked is None:
         out.print(escape(answer.most["calm"].message), highlight=False)
+    swinging = answer.others is not None and answer.others.team.n < study.STEADY
     load, asked = team.load_mass, answer.asked is not None
     if answer.held.ok or asked:
         what = f"{load:.4g} kg" + ("" if asked else ", the heaviest")
@@ -191,7 +192,7 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
             ["no", *_held(answer.held), _minutes(study.lasts(crew, answer.held))],
             [
                 "the worst one",
-                *_held(answer.held_spare),
+                *_held(answer.held_spare, swinging=swinging),
                 _minutes(study.lasts(answer.others, answer.held_spare)),
             ],
         ]
@@ -219,16 +220,24 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
         rows = [
             [
                 each.reference, "each drone's" if each.cut else "none",
-                shares.text(each.good, each.flights), each.first_bad or "-",
+                shares.text(each.good, each.flights), f"{each.farthest:.2f}" if each.good else "-", each.first_bad or "-",
             ]
             for each in flights
         ]  # fmt: skip
-        show_tables([("Flown", ["reference", "cable cut", "good", "first that was not"], rows)])
+        show_tables(
+            [
+                (
+                    "Flown",
+                    ["reference", "cable cut", "good", "load off, m", "first that was not"],
+                    rows,
+                )
+            ]
+        )
 
 
-def _held(found: Judgement) -> list[str]:
+def _held(found: Judgement, *, swinging: bool = False) -> list[str]:
     """Whether a load is carried, and the drone's thrust that is nearest its limit, in hover and in the wind."""
-    cells = ["yes" if found.ok else "no"]
+    cells = ["no" if not found.ok else "swinging" if swinging else "yes"]
     for thrusts in (found.thrusts, found.in_wind):
         share = thrusts / found.limits
         if len(share) == 0 or math.isnan(float(share.max())):

@@ -52,6 +52,8 @@ CLOSE = 1e-3
 """How closely, as a share of that largest load."""
 MOST_DRONES = 64
 """Most drones that are looked for."""
+STEADY = 3
+"""Cables that hold a load against pushes from every side: two leave it to swing across their plane, one on all sides."""
 BASE: dict[str, Any] = {"name": "size", "reference": {"kind": "hover"}}
 """The mission of drones that are given without one: everything else follows from the bodies."""
 
@@ -307,14 +309,17 @@ def worst_loss(crew: Crew) -> tuple[int, Crew, Judgement] | None:
 
 
 def fewest(crew: Crew, at_most: int) -> tuple[int | None, int | None]:
-    """How many drones like the first carry the load, and how many do so that one may be lost; None where ``at_most`` do not."""
+    """How many drones like the first carry the load, and how many do so that one may be lost; None where ``at_most`` do not.
+
+    Those that are left must be ``STEADY`` at least: with fewer the load swings by metres before it is caught, if it is.
+    """
     few, before = None, False
     for n in range(1, at_most + 1):
         some = crew.of([0] * n)
         held = some.ceiling >= some.team.load_mass and some.judge().ok
         if held and few is None:
             few = n
-        if held and before:
+        if held and before and n > STEADY:
             return few, n
         before = held
     return few, None
@@ -532,18 +537,21 @@ def remarks(answer: Answer) -> list[str]:
         found.append("A single drone has no spare: if it is lost, the load falls.")
     elif others.team.n == 1:
         need = float(others.team.masses[0] + team.load_mass) * team.gravity
-        able = "carries it, on a cable that swings" if answer.held_spare.ok else "does not carry it"
+        able = "carries it, if it survives the fall of the load into its cable and the swing that follows"
         found.append(
-            f"If one of the two is lost, the other must hold {need:.4g} N in hover, of the {answer.held_spare.limits[0]:.4g} N that it has: "
-            f"it {able}."
+            f"Two drones are not safe against the loss of one: the other must hold {need:.4g} N in hover, of the "
+            f"{answer.held_spare.limits[0]:.4g} N that it has; it {able if answer.held_spare.ok else 'does not carry it'}."
         )
-    elif others.team.n == 2 and answer.held_spare.ok:
+    elif others.team.n < STEADY and answer.held_spare.ok:
         found.append(
-            "If one of the three is lost, the load hangs in the plane of two cables; across it, it swings as a pendulum with a period of "
-            f"{swing(others.team, others.settled()[0]):.2g} s, which only the drones' motion damps."
+            "Three drones are not safe against the loss of one: two could hold the load at rest, but it falls out of the balance of three and "
+            f"swings across the plane of two cables with a period of {swing(others.team, others.settled()[0]):.2g} s, by metres, which only the "
+            "drones' motion damps. Four are steady with one lost; --fly shows how often three get away with it."
         )
-    elif others.team.n == 2:
-        found.append("If one of the three is lost, the two that are left do not carry the load.")
+    elif others.team.n < STEADY:
+        found.append(
+            "Three drones are not safe against the loss of one: the two that are left do not carry the load."
+        )
     return found
 
 
@@ -587,7 +595,11 @@ def as_json(question: Question, answer: Answer, flights: Iterable[Flown]) -> dic
         },
         "load": {
             "all": held(answer.held, lasts(answer.crew, answer.held)),
-            "one_lost": {"lost_drone": answer.lost} | held(answer.held_spare, lasts(answer.others, answer.held_spare)),
+            "one_lost": {
+                "lost_drone": answer.lost,
+                "steady": answer.others is not None and answer.others.team.n >= STEADY,
+            }
+            | held(answer.held_spare, lasts(answer.others, answer.held_spare)),
         },
         "fewest": {"all": answer.few, "one_lost": answer.few_spare, "at_most": question.at_most},
         "endurance_needs": unknown(team),
@@ -595,7 +607,7 @@ def as_json(question: Question, answer: Answer, flights: Iterable[Flown]) -> dic
         "flown": [
             {
                 "reference": each.reference, "cable_cut": each.cut, "good": each.good, "flights": each.flights,
-                "interval": each.interval, "first_bad": each.first_bad,
+                "interval": each.interval, "farthest_m": each.farthest, "first_bad": each.first_bad,
             }
             for each in flights
         ],
@@ -619,12 +631,27 @@ FLOWN: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Flown:
-    """Flights of one kind: how many were good of how many, and the worst of the first that was not, in words."""
+    """Flights of one kind.
+
+    Attributes
+    ----------
+    reference : str
+    cut : bool
+        Whether a cable was cut.
+    good, flights : int
+        How many were good, of how many.
+    farthest : float
+        Most that the load was off its reference in those that were good, m; NaN without any.
+    first_bad : str
+        What was wrong with the first that was not.
+
+    """
 
     reference: str
     cut: bool
     good: int
     flights: int
+    farthest: float
     first_bad: str
 
     @property
@@ -648,19 +675,22 @@ def fly(
     total = len(SEEN) * seeds * sum(len(drones) for drones in cuts)
     for drones in cuts:
         for reference in SEEN:
-            good, flights, bad = 0, 0, ""
+            good, flights, farthest, bad = 0, 0, math.nan, ""
             for seed in range(seeds):
                 for drone in drones:
-                    said = _flight(question, answer, reference, seed, drone)
+                    said, off = _flight(question, answer, reference, seed, drone)
                     good, flights, done = good + (not said), flights + 1, done + 1
                     bad = bad or said
+                    farthest = farthest if said else float(np.fmax(farthest, off))
                     advance(done / total)
-            found.append(Flown(reference, drones[0] is not None, good, flights, bad))
+            found.append(Flown(reference, drones[0] is not None, good, flights, farthest, bad))
     return found
 
 
-def _flight(question: Question, answer: Answer, reference: str, seed: int, cut: int | None) -> str:
-    """What was wrong with a flight; empty where nothing was."""
+def _flight(
+    question: Question, answer: Answer, reference: str, seed: int, cut: int | None
+) -> tuple[str, float]:
+    """What was wrong with a flight, empty where nothing was, and the most that the load was off its reference, m."""
     team = answer.crew.team
     changes = question.changes(team.n, team.load_mass, heading_deg=(137.5 * seed) % 360.0)
     changes |= {**FLOWN, "reference": {"kind": reference}, "seed": seed, **motors(answer.mission)}
@@ -672,17 +702,16 @@ def _flight(question: Question, answer: Answer, reference: str, seed: int, cut: 
     values = metrics.compute(recording)
     where = f"seed {seed}" + ("" if cut is None else f", cable {cut} cut")
     if recording.outcome != "completed":
-        return f"{where}: {recording.outcome}"
+        return f"{where}: {recording.outcome}", math.inf
     error = np.linalg.norm(metrics.tracking_error(recording), axis=1)
-    late, allowed = (
-        float(error[len(error) // 2 :].max()),
-        NEAR * max(1.0, float(team.cable_lengths.max())),
-    )
+    worst = float(error.max())
+    late = float(error[len(error) // 2 :].max())
+    allowed = NEAR * max(1.0, float(team.cable_lengths.max()))
     if not late <= allowed:
-        return f"{where}: the load is {late:.3g} m off, more than {allowed:.3g} m"
+        return f"{where}: the load is {late:.3g} m off, more than {allowed:.3g} m", worst
     gone = int(values["lost_drones"] or 0)
     if gone != (cut is not None):
-        return f"{where}: {gone} drones were judged lost"
+        return f"{where}: {gone} drones were judged lost", worst
     if values["min_angle_deg"] <= ANGLE:
-        return f"{where}: two cables came within {values['min_angle_deg']:.3g} degrees"
-    return ""
+        return f"{where}: two cables came within {values['min_angle_deg']:.3g} degrees", worst
+    return "", worst
