@@ -37,19 +37,18 @@ Vehicle = Annotated[
     str | None, typer.Option(help="A known drone, or a TOML file with its numbers.")
 ]
 Drones = Annotated[
-    int | None,
-    typer.Option(help="How many drones.", show_default="as many as the load takes", min=1, max=64),
+    int | None, typer.Option(help="How many drones.", show_default="as many as the load takes")
 ]
 Cable = Annotated[float | None, typer.Option(help="Length of each cable, m.", show_default="1")]
 Load = Annotated[float | None, typer.Option(help="Load, kg.", show_default="the heaviest")]
 Wind = Annotated[
     float | None,
     typer.Option(
-        help="Mean wind, m/s, with its turbulence and gusts.", show_default="none, or the mission's",
-        min=0.0, max=60.0,
+        help="Mean wind, m/s, with its turbulence and gusts.",
+        show_default="none, or the mission's",
     ),
-]  # fmt: skip
-AtMost = Annotated[int, typer.Option(help="Most drones that are looked for.", min=1, max=64)]
+]
+AtMost = Annotated[int, typer.Option(help="Most drones that are looked for.")]
 Mass = Annotated[float | None, typer.Option(help="Of a drone with battery, kg.")]
 Thrust = Annotated[float | None, typer.Option(help="Largest thrust of a drone, N.")]
 Arm = Annotated[float | None, typer.Option(help="From the centre to a rotor's axis, m.")]
@@ -62,7 +61,7 @@ Efficiency = Annotated[
     float | None, typer.Option(help="Ideal power of the rotors in hover over the battery's.")
 ]
 Fly = Annotated[bool, typer.Option("--fly", help="Fly it as well, each drone's cable cut, too.")]
-Seeds = Annotated[int, typer.Option(help="Flights of each case.", min=1, max=10_000)]
+Seeds = Annotated[int, typer.Option(help="Flights of each case.")]
 
 
 @app.command()
@@ -109,6 +108,7 @@ def size(
         "efficiency": efficiency,
     }  # fmt: skip
     numbers = {name: value for name, value in numbers.items() if value is not None}
+    _check({"--drones": drones, "--wind": wind, "--at-most": at_most, "--seeds": seeds})
     if mission is None:
         _enough(numbers, drones, load)
     with loading():
@@ -135,6 +135,21 @@ def size(
         show_notes(notes)
     if not answer.ok:
         raise typer.Exit(EXIT_ERROR)
+
+
+RANGES = {"--drones": (1, 64), "--wind": (0, 60), "--at-most": (1, 64), "--seeds": (1, 10_000)}
+"""What is no field of a mission: least and most."""
+
+
+def _check(given: Mapping[str, float | None]) -> None:
+    """Refuse values out of range."""
+    problems = [
+        Problem(name, f"{value:g}", f"must be between {low} and {high}")
+        for name, (low, high) in RANGES.items()
+        if (value := given[name]) is not None and not low <= value <= high
+    ]
+    if problems:
+        raise MissionError("size", problems)
 
 
 def _enough(numbers: Mapping[str, Any], drones: int | None, load: float | None) -> None:

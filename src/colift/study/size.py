@@ -50,8 +50,6 @@ STEPS = 16
 """Loads that are tried from the largest that the thrust lifts downwards, before the heaviest is closed in on."""
 CLOSE = 1e-3
 """How closely, as a share of that largest load."""
-MOST_DRONES = 64
-"""Most drones that are looked for."""
 STEADY = 3
 """Cables that hold a load against pushes from every side: two leave it to swing across their plane, one on all sides."""
 BASE: dict[str, Any] = {"name": "size", "reference": {"kind": "hover"}}
@@ -311,7 +309,7 @@ def worst_loss(crew: Crew) -> tuple[int, Crew, Judgement] | None:
 def fewest(crew: Crew, at_most: int) -> tuple[int | None, int | None]:
     """How many drones like the first carry the load, and how many do so that one may be lost; None where ``at_most`` do not.
 
-    Those that are left must be ``STEADY`` at least: with fewer the load swings by metres before it is caught, if it is.
+    Those that are left must be ``STEADY`` at least: with fewer the load swings widely before it is caught, if it is.
     """
     few, before = None, False
     for n in range(1, at_most + 1):
@@ -545,7 +543,7 @@ def remarks(answer: Answer) -> list[str]:
     elif others.team.n < STEADY and answer.held_spare.ok:
         found.append(
             "Three drones are not safe against the loss of one: two could hold the load at rest, but it falls out of the balance of three and "
-            f"swings across the plane of two cables with a period of {swing(others.team, others.settled()[0]):.2g} s, by metres, which only the "
+            f"swings across the plane of two cables with a period of {swing(others.team, others.settled()[0]):.2g} s, widely, which only the "
             "drones' motion damps. Four are steady with one lost; --fly shows how often three get away with it."
         )
     elif others.team.n < STEADY:
@@ -692,7 +690,8 @@ def _flight(
 ) -> tuple[str, float]:
     """What was wrong with a flight, empty where nothing was, and the most that the load was off its reference, m."""
     team = answer.crew.team
-    changes = question.changes(team.n, team.load_mass, heading_deg=(137.5 * seed) % 360.0)
+    count = team.n if question.only_drones else question.drones
+    changes = question.changes(count, team.load_mass, heading_deg=(137.5 * seed) % 360.0)
     changes |= {**FLOWN, "reference": {"kind": reference}, "seed": seed, **motors(answer.mission)}
     if cut is not None:
         changes["fault"] = [{"kind": "cable-cut", "at": CUT_AT, "drone": cut}]
