@@ -92,6 +92,11 @@ class Setup(Declared, Protocol):
         ...
 
     @property
+    def reference(self) -> Any:
+        """The part of this layer."""
+        ...
+
+    @property
     def disturbance(self) -> Sequence[Any]:
         """Disturbances, all at once."""
         ...

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import colift
+from colift.kernel.phase import Phase
 from colift.kernel.signals import CYCLE_SIGNALS, SIGNALS
 from colift.mission import load_mission
 from colift.mission.criteria import METRICS
@@ -33,7 +34,16 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["peak_tensions"][7, 0], arrays["peak_tensions"][8, -1] = 30.0, 40.0  # between rows
     arrays["catch_impulses"][9, 0] = 0.3
     arrays["ground_forces"][100:150, -1, 2] = 2.0
-    arrays["touch_speeds"][99, -1] = 0.7
+    arrays["touch_speeds"][99, -1], arrays["touch_speeds"][99, 0] = 0.7, 0.2
+    # Lifted from there, and set down at half time.
+    for begin, stop, phase in (
+        (100, 110, Phase.STAND), (110, 120, Phase.CLIMB), (120, 140, Phase.HOOK),
+        (140, 155, Phase.TENSION), (155, 160, Phase.RISE), (1000, 1010, Phase.TOUCH),
+        (1010, 1016, Phase.UNLOAD), (1016, 1020, Phase.SLACKEN),
+    ):  # fmt: skip
+        arrays["phase"][begin:stop] = phase
+    arrays["peak_tensions"][130, 0] = 11.0
+    arrays["weighed_mass"][160:] = 0.2
     arrays["saturated_times"][-1] = 0.25
     arrays["desired_tensions"][:] = arrays["tensions"] - 0.25
     arrays["directions"][:] = ring(n, np.radians(40.0))
@@ -74,6 +84,7 @@ def neighbour_angle(cone_deg, n=4):
     return math.degrees(2.0 * math.asin(math.sin(math.radians(cone_deg)) * math.sin(math.pi / n)))
 
 
+WEIGHT = 0.225 * 9.81
 EXPECTED = {
     "tracking_rms_m": math.sqrt((1000 * 0.03**2 + 1000 * 0.04**2) / 2000),
     "tracking_max_m": 0.04,
@@ -100,6 +111,13 @@ EXPECTED = {
     "min_height_m": 3.0 - 0.04,
     "touch_speed_mps": 0.7,
     "ground_time_s": 0.5,
+    "drone_touch_speed_mps": 0.2,
+    "lift_peak": 11.0 / WEIGHT,
+    "touch_peak": 0.4 * 11.15 / WEIGHT,
+    "dragged_m": 0.03,
+    "touch_height_m": 3.0,
+    "placement_m": 0.03,
+    "weighed_mass_kg": 0.2,
     "lost_drones": 1.0,
     "detection_delay_s": 0.12,
     "allocator_failures": 2.0,

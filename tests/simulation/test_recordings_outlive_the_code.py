@@ -123,7 +123,8 @@ def test_opening_imports_no_kernel() -> None:
 
 
 NEWER = {"phase", "ground_forces", "touch_speeds", "clock", "measured_ages", "estimated_ages", "received_ages", "agent_status",
-         "estimated_forces", "estimated_wind"}  # fmt: skip
+         "estimated_forces", "estimated_wind", "standing", "lift_share", "spans", "unhooked",
+         "weighed_mass"}  # fmt: skip
 """Signals that came after the recording that is kept here."""
 
 

@@ -16,6 +16,11 @@ export const STATUS = [
 
 /** Kinds of moments: a word, a shape in a box of 12 x 12, and the tone of its colour. */
 export const KINDS = {
+  "phase": {
+    "word": "phase",
+    "shape": "M3 1.5L3 10.5M3 2L10 4.5L3 7",
+    "tone": "info"
+  },
   "command": {
     "word": "command",
     "shape": "M6 1.5Q10.5 1.5 10.5 6Q10.5 10.5 6 10.5Q1.5 10.5 1.5 6Q1.5 1.5 6 1.5Z",

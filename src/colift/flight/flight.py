@@ -79,6 +79,9 @@ class Flight:
         start = start_state(mission)
         self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
         bus = self.bus
+        self.wires.reference.writes.reference[:] = bus.reference[:] = mission.reference.sample(
+            np.zeros(1), mission.team.of(drones)
+        )[0]
         bus.desired_directions[:] = start.directions
         bus.received_directions[:] = start.directions
 

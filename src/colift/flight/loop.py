@@ -47,7 +47,8 @@ Common = named_tuple(
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
         "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "reference",
-        "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends",
+        "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends", "reference_shift",
+        "lift_share", "unhooked", "attached",
         *(name for name in agents.SIGNALS if name != "carrying"),
     ],
     __name__,
@@ -97,12 +98,12 @@ _decide = agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
-def _follow_clock(course, rate, reference, nominal):  # type: ignore[no-untyped-def]
-    """From derivatives along the reference's clock, which runs at this rate, to those in time."""
+def _follow_clock(course, rate, shift, reference, nominal):  # type: ignore[no-untyped-def]
+    """From derivatives along the reference's clock, which runs at this rate, to those in time; and shifted."""
     power = 1.0
     for m in range(4):
         for j in range(3):
-            reference[m, j] = power * course.reference[m, j]
+            reference[m, j] = power * course.reference[m, j] + shift[m, j]
         if m < 3:
             for i in range(nominal.shape[0]):
                 for j in range(3):
@@ -130,7 +131,10 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
         ends_of(bus.estimated_load, bus.estimated_ends)
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
-        _follow_clock(wires.reference.writes, bus.clock[1], bus.reference, bus.nominal_forces)
+        _follow_clock(
+            wires.reference.writes, bus.clock[1], bus.reference_shift, bus.reference,
+            bus.nominal_forces,
+        )  # fmt: skip
         ends_of(bus.reference, bus.wanted_ends)
 
         if k % every.load_control == 0:
@@ -158,6 +162,8 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
                 cycles[row, 0] = _SILENT
 
         if not leaderless:
+            for i in range(n):
+                wires.link.sees.desired_tensions[i] = bus.lift_share[0] * bus.desired_tensions[i]
             _transmit(wires.link, k, t, dt)
 
         if k % every.position_control == 0:
@@ -169,6 +175,9 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             _control_attitude(wires.attitude_control, k, t, every.attitude_control * dt)
 
         _actuate(wires.actuation, k, t, dt)
+        for i in range(n):
+            if bus.unhooked[i] != 0.0:
+                bus.attached[i] = 0.0
         bus.wind[:] = 0.0
         bus.external_forces[:] = 0.0
         for m in range(disturbances):
@@ -234,7 +243,13 @@ def circuit(
     signals = bus._asdict()
     # The reference writes along its clock, into arrays of its own; the loop makes those of the bus of them.
     course = {name: signals[name].copy() for name in PORTS["reference"].writes}
-    own = {"reference": signals | course, "agents": agents.first_of(signals)}
+    # Supervisors see it as it is; what the cables are told is the supervisor's share of the wanted tensions.
+    own = {
+        "reference": signals | course,
+        "supervision": signals | {"reference": course["reference"]},
+        "link": signals | {"desired_tensions": signals["desired_tensions"].copy()},
+        "agents": agents.first_of(signals),
+    }
     wires = {
         name: PORTS[name].wire(
             _checked(layer, parts[layer], function, PORTS[name].signature),

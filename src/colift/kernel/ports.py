@@ -223,9 +223,15 @@ PORTS: dict[str, Port] = {
     for port in (
         Port("sensing", sees=(*_TRUE.split(), "stuck")),
         Port("estimation", sees=(*_named("measured"), "measured_ages", "thrusts", *_RECEIVED)),
-        Port("supervision", sees=(*_named("estimated"), "thrusts", *_RECEIVED)),
+        Port(
+            "supervision",
+            sees=(
+                *_named("estimated"), "estimated_ends", "estimated_forces", "estimated_wind", "thrusts",
+                "reference", *_RECEIVED,
+            ),
+        ),
         Port("reference", sees=()),
-        Port("load_control", sees=("estimated_load", "reference", "estimated_forces")),
+        Port("load_control", sees=("estimated_load", "reference", "estimated_forces", "standing")),
         Port("allocation", sees=("force", "reference", "nominal_forces"), answers=True),
         Port("link", sees=("desired_tensions", "desired_directions")),
         Port("network", sees=("outboxes",)),
@@ -235,12 +241,19 @@ PORTS: dict[str, Port] = {
             answers=True,
             table={signal.name: signal for signal in OF_ONE},
         ),
-        Port("observation", sees=(*_named("estimated"), "estimated_ends", "thrusts", *_RECEIVED)),
+        Port(
+            "observation",
+            sees=(
+                *_named("estimated"), "estimated_ends", "thrusts", "standing", "held_forces",
+                *_RECEIVED,
+            ),
+        ),
         Port(
             "position_control",
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
-                "reference", "wanted_ends", "nominal_forces", *_RECEIVED,
+                "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses",
+                *_RECEIVED,
             ),
         ),
         Port(
@@ -255,7 +268,7 @@ PORTS: dict[str, Port] = {
             "detection",
             sees=(
                 "estimated_ends", *_named("estimated")[1:4], "estimated_ages", "thrusts",
-                *_RECEIVED,
+                "lift_share", *_RECEIVED,
             ),
         ),
         Port("plant_observe", sees=()),

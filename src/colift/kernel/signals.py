@@ -101,6 +101,11 @@ SIGNALS = (
     Signal("agent_status", ("n",), "1", "-", "-", "status of each drone's own agent", writer="agents"),
     Signal("phase", (1,), "1", "-", "-", "what the supervisor is about; 0 is flying", writer="supervision"),
     Signal("clock", (2,), "s, 1", "-", "-", "time that the reference is given, and how fast it runs: 1 as time does, 0 held", initial=0.0, writer="supervision"),
+    Signal("standing", ("n+1",), "1", "-", "-", "1 for each drone and, last, the load that is taken to stand on the ground", writer="supervision"),
+    Signal("lift_share", (1,), "1", "s", "-", "share of the wanted tensions that the cables are given", initial=1.0, writer="supervision"),
+    Signal("spans", ("n", 3), "m, m/s, m/s^2", "r_i - L_i", "-", "distance that each drone keeps from its cable's end, less the cable's length; two derivatives", writer="supervision"),
+    Signal("unhooked", ("n",), "1", "-", "-", "1 for each cable that is told to let go of the load", writer="supervision"),
+    Signal("weighed_mass", (1,), "kg", "-", "-", "mass of the load as weighed at lift-off; 0 where nobody weighs it", writer="supervision"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 
@@ -130,6 +135,13 @@ NOMINAL = Signal(
 )
 """Not recorded: what follows a plan has it on file."""
 
+LEAD = (
+    Signal("reference_shift", (4, 3), "m, m/s, m/s^2, m/s^3", "-", "world", "what the loop adds to the reference", writer="supervision"),
+    Signal("courses", ("n", 3, 3), "m, m/s, m/s^2", "-", "world", "where each drone is led, with two derivatives; not numbers while it holds its place in the formation", initial=np.nan, writer="supervision"),
+    Signal("held_forces", ("n+1", 3), "N", "-", "world", "forces that observers hold while the load stands: on the drones and, last, what the load pushes beyond the weight that they are told", writer="supervision"),
+)  # fmt: skip
+"""How a supervisor leads load and drones beside the reference; not recorded."""
+
 ENDS = (
     Signal("ends", ("n", 2, 3), "m, m/s", "-", "world", "places and velocities of the cables' ends on the load", writer="plant_observe"),
     Signal("estimated_ends", ("n", 2, 3), "m, m/s", "-", "world", "those that the controllers use, of the estimated load"),
@@ -149,7 +161,7 @@ MESSAGES = (
 )  # fmt: skip
 """Of a team without a leader; not recorded."""
 
-HIDDEN = (ANSWER, NOMINAL, *ENDS, *MESSAGES)
+HIDDEN = (ANSWER, NOMINAL, *LEAD, *ENDS, *MESSAGES)
 """Signals of the bus that stand outside of its row."""
 
 OF_ONE = (

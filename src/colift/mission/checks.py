@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from colift.control.allocation.base import Allocation, AllocatorPart
 from colift.control.allocation.limits.hover import hover_conflicts
+from colift.control.supervision.base import SupervisionPart
 from colift.errors import Problem, UnknownNameError
 from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
@@ -98,6 +99,26 @@ def cross_checks(
         yield Problem("disturbance", f"{len(lists['disturbance'])} parts", message)
     yield from _fault_checks(frame, parts, lists["fault"], broken)
     yield from ground_checks(frame, parts, broken)
+    yield from _supervision_checks(frame, parts)
+
+
+def _supervision_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
+    """A supervisor whose orders another layer does not know."""
+    supervisor = parts.get("supervision")
+    if not isinstance(supervisor, SupervisionPart):
+        return
+    for layer, kinds in supervisor.works_with.items():
+        found = kind_of(type(parts[layer])) if layer in parts else ""
+        if found and found not in (*kinds, "external"):
+            wanted = " or ".join(f'"{kind}"' for kind in kinds)
+            message = (
+                f'needs {layer}.kind = {wanted}: "{found}" knows nothing of a load that stands on the ground, '
+                "nor of cables that are slack on purpose"
+            )
+            yield Problem("supervision.kind", kind_of(type(supervisor)), message)
+    if supervisor.works_with and frame.ground is None:
+        message = 'needs a ground to take off from and to land on, but world.ground = "none"'
+        yield Problem("supervision.kind", kind_of(type(supervisor)), message)
 
 
 def _of_drones(frame: Frame, field: str) -> str:

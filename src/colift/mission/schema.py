@@ -532,9 +532,9 @@ class Frame(Section):
         level = -self.start_directions()
         level[:, 2] = 0.0
         sizes = np.linalg.norm(level, axis=1, keepdims=True)
-        level = np.where(
-            sizes > 1e-9, level / np.maximum(sizes, 1e-9), ring(len(drones), math.pi / 2)
-        )
+        around = 2.0 * math.pi * np.arange(len(drones)) / len(drones)
+        spread = np.column_stack([np.cos(around), np.sin(around), np.zeros(len(drones))])
+        level = np.where(sizes > 1e-9, level / np.maximum(sizes, 1e-9), spread)
         return np.asarray(load + self.start.spread * self.team.cable_lengths[drones, None] * level)
 
 

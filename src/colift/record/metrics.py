@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.errors import AbsentSignalError
+from colift.kernel.phase import Phase
 from colift.kernel.status import Status
 from colift.mission.criteria import METRICS
 from colift.record.ends import cable_ends
 from colift.record.recording import Recording
+from colift.record.resting import rests
 from colift.team.geometry import pairwise_angles
 
 _FORMULAS: dict[str, Callable[[Recording], float]] = {}
@@ -277,7 +279,10 @@ def energy_imbalance(r: Recording) -> float:
 
 @_metric
 def slack_time_s(r: Recording) -> float:
-    return float(sum(_largest(times) for times in r["slack_times"].T))
+    spent = r["slack_times"]
+    lies = rests(r)
+    rested = np.diff(spent, axis=0, prepend=np.zeros_like(spent[:1]))[lies] if lies.any() else 0.0
+    return float(sum(_largest(times) for times in spent.T)) - float(np.nansum(rested))
 
 
 @_metric
@@ -295,6 +300,59 @@ def ground_time_s(r: Recording) -> float:
     if not (_has_ground(r) and r.measured("ground_forces")):
         return math.nan
     return integral((r["ground_forces"][:, -1, 2] > 0.0).astype(float), r.time)
+
+
+@_metric
+def drone_touch_speed_mps(r: Recording) -> float:
+    return _largest(r["touch_speeds"][:, :-1]) if _has_ground(r) else math.nan
+
+
+@_metric
+def lift_peak(r: Recording) -> float:
+    return _peak_over_weight(r, Phase.HOOK, Phase.TENSION, Phase.RISE)
+
+
+@_metric
+def touch_peak(r: Recording) -> float:
+    return _peak_over_weight(r, Phase.TOUCH, Phase.UNLOAD)
+
+
+def _peak_over_weight(r: Recording, *phases: Phase) -> float:
+    rows = np.isin(r["phase"][:, 0], phases)
+    weight = r.mission.true_team.load_mass * r.mission.team.gravity
+    return _largest(r["peak_tensions"][rows, :-1]) / weight if weight > 0.0 else math.nan
+
+
+@_metric
+def dragged_m(r: Recording) -> float:
+    phases = r["phase"][:, 0]
+    lies = np.isin(phases, (Phase.STAND, Phase.CLIMB, Phase.HOOK, Phase.TENSION))
+    lifted = np.flatnonzero(lies & ~rests(r))
+    rows = np.flatnonzero(lies & (phases != Phase.STAND))
+    rows = rows[rows < lifted[0]] if lifted.size else rows
+    way = r["load"][rows, 0, :2] - r["load"][:1, 0, :2]
+    return _largest(np.linalg.norm(way, axis=1))
+
+
+@_metric
+def touch_height_m(r: Recording) -> float:
+    phases = r["phase"][:, 0]
+    told = np.flatnonzero((phases[1:] == Phase.UNLOAD) & (phases[:-1] == Phase.TOUCH)) + 1
+    if not (told.size and r.mission.ground is not None):
+        return math.nan
+    return _largest(r["load"][told, 0, 2] - r.mission.ground.height)
+
+
+@_metric
+def placement_m(r: Recording) -> float:
+    down = np.flatnonzero(r["phase"][:, 0] > Phase.UNLOAD)
+    return _largest(np.linalg.norm(tracking_error(r)[down, :2], axis=1))
+
+
+@_metric
+def weighed_mass_kg(r: Recording) -> float:
+    weighed = r["weighed_mass"][:, 0]
+    return float(weighed[-1]) if weighed[-1] > 0.0 else math.nan
 
 
 def _has_ground(r: Recording) -> bool:

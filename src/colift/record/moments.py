@@ -13,15 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from colift.kernel.phase import Phase
 from colift.kernel.status import Status
 from colift.mission.schema import Event
 from colift.record.recording import Recording
+from colift.record.resting import rests
 from colift.record.verdict import limits
 from colift.team.geometry import pairwise_angles
 
 Array = NDArray[np.float64]
 
 KINDS = {
+    "phase": "phase",
     "command": "command",
     "change": "change",
     "fault": "fault",
@@ -164,6 +167,7 @@ class _Ongoing(NamedTuple):
 
 
 def _ongoing(recording: Recording) -> Iterator[_Ongoing]:
+    yield from _phases(recording)
     yield from _faults(recording)
     yield from _slack(recording)
     yield from _touches(recording)
@@ -200,6 +204,37 @@ def _known(recording: Recording, name: str) -> Array | None:
     return None if np.isnan(values).all() else values
 
 
+PHASES = {
+    Phase.STAND: "On the ground",
+    Phase.CLIMB: "Drones climb",
+    Phase.HOOK: "Cables are drawn taut",
+    Phase.TENSION: "Tensions rise",
+    Phase.RISE: "Load rises",
+    Phase.FLY: "Flight along the reference",
+    Phase.LOWER: "Load is lowered",
+    Phase.TOUCH: "Load is set down",
+    Phase.UNLOAD: "Touch-down told, cables unloaded",
+    Phase.SLACKEN: "Cables slacken",
+    Phase.RELEASE: "Load released, drones land",
+    Phase.LAND: "Drones land",
+    Phase.DONE: "All on the ground",
+}
+"""What is said as each phase begins."""
+
+
+def _phases(recording: Recording) -> Iterator[_Ongoing]:
+    """What a supervised flight is about."""
+    found = _known(recording, "phase")
+    if found is None or not found.any():
+        return
+    for number in np.unique(found[~np.isnan(found)]).astype(int).tolist():
+        known = number in set(Phase)
+        text = PHASES[Phase(number)] if known else f"Phase {number}"
+        yield _Ongoing(
+            "phase", text, None, recording.time, found[:, 0] == number, _always(text), _always("")
+        )
+
+
 def _faults(recording: Recording) -> Iterator[_Ongoing]:
     """What does not work, as the signals say that faults change."""
     time, n = recording.time, recording.n
@@ -211,6 +246,9 @@ def _faults(recording: Recording) -> Iterator[_Ongoing]:
     attached = _known(recording, "attached")
     if attached is not None:
         cut = attached == 0.0
+        let_go = _known(recording, "unhooked")
+        if let_go is not None:
+            cut &= let_go == 0.0  # told with the phase
         for i in np.flatnonzero(cut.any(axis=0)).tolist():
             yield fault(_cut(i), i, cut[:, i])
     health = _known(recording, "motor_health")
@@ -247,6 +285,7 @@ def _slack(recording: Recording) -> Iterator[_Ongoing]:
     before = np.zeros((1, recording.n)) if recording.time[0] == 0.0 else spent[:1]
     grown = np.diff(spent, axis=0, prepend=before)
     grown[recording["attached"] == 0.0] = 0.0  # a cable that is cut is not slack
+    grown[rests(recording)] = 0.0  # nor is one of a load that lies on the ground
     for i in np.flatnonzero((grown > 0.0).any(axis=0)).tolist():
 
         def more(first: int, last: int, gained: Array = grown[:, i]) -> str:

@@ -67,6 +67,9 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     thrusts, tensions = sees.thrusts, sees.received_tensions
     carrying = writes.carrying
     n = positions.shape[0]
+    if sees.lift_share[0] == 0.0:  # cables that are slack on purpose
+        memory[:] = 0.0
+        return
     hold, fast, longer = params[P.hold], params[P.speed], params[P.length]
     learn, deficit, g = params[P.learning], params[P.deficit], params[P.g]
     frozen, astray, tug = params[P.frozen], params[P.astray], params[P.tug]

@@ -28,6 +28,8 @@ def _balance(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     m, g, last = params[P.m], params[P.g], sees.estimated_forces.shape[0] - 1
     share = 1.0 - decay(now.dt, 1.0 / params[P.rate])
     push = M.push
+    if sees.standing[last] != 0.0:  # the whole weight, as it is known
+        share = 1.0
     for k in range(3):
         memory[push + k] += share * (forces[last, k] - memory[push + k])
         u_L[k] = m * (reference[2, k] + (g if k == 2 else 0.0)) - memory[push + k]

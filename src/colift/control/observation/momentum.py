@@ -28,9 +28,10 @@ PARAMS = Layout(
 """Bandwidths of the observers of the ``total`` momentum and of each drone's ``own``, 1/s; ``limit`` over weight."""
 MEMORY = Layout(
     team={"started": 1, "momentum": 3, "common": 3, "wind": 3},
-    drone={"own": 3, "felt": 3, "direction": 3, "thrust": 1},
+    drone={"own": 3, "felt": 3, "direction": 3, "thrust": 1, "apart": 3},
 )
-"""``momentum`` and ``own``: as far as explained; ``felt``: force beyond thrust, weight and the wanted pull; ``common``: per mass."""
+"""``momentum`` and ``own``: as far as explained; ``felt``: force beyond thrust, weight and the wanted pull; ``common``: per mass;
+``apart``: by how much what a drone felt while its cable was slack differs from what all felt in common."""
 P, M = PARAMS.at, MEMORY.at
 
 DOUBT = 0.05
@@ -82,6 +83,7 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     g, m_L = params[P.g], params[P.m_L]
     total, own, delay = params[P.total], params[P.own], params[P.delay]
     lag = decay(dt, params[P.lag])
+    stands, held = sees.standing[n] != 0.0, sees.held_forces
     fresh = memory[M.started] == 0.0
     memory[M.started] = 1.0
     weight = pull_of_wind = 0.0
@@ -123,9 +125,13 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 pull = T[i] * memory[o + M.direction + k]
                 memory[o + M.own + k] += dt * (known + pull + memory[o + M.felt + k])
                 memory[o + M.felt + k] = own * (m * v[i, k] - memory[o + M.own + k])
+        if stands:  # the cable's pull is not what is told, the ground's not to be learned
+            for k in range(3):
+                memory[o + M.felt + k] = held[i, k]
+                memory[o + M.own + k] = m * v[i, k] - held[i, k] / own
     cx, cy, cz = _common(n, params, memory)
     common = (cx, cy, cz)
-    if pull_of_wind > 0.0:
+    if pull_of_wind > 0.0 and not stands:
         # What is common is wind, by and by, and rotors drag in it in proportion to their thrust.
         share = dt * params[P.breeze] * weight / (max(g, 1e-3) * pull_of_wind)
         for k in range(2):
@@ -142,7 +148,12 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         momentum = m_L * load[1, k]
         for i in range(n):
             momentum += params[P.rows + P.width * i + P.m] * v[i, k]
-        if fresh:
+        if stands:
+            known = 0.0
+            for i in range(n + 1):
+                known += held[i, k]
+            memory[M.momentum + k] = momentum - known / total
+        elif fresh:
             memory[M.momentum + k] = momentum
         else:
             memory[M.momentum + k] -= dt * m_L * g if k == 2 else 0.0
@@ -158,8 +169,13 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         o, m = M.rows + M.width * i, params[P.rows + P.width * i + P.m]
         along = 0.0
         for k in range(3):
-            along += memory[o + M.direction + k] * (m * common[k] - memory[o + M.felt + k])
+            if stands:
+                memory[o + M.apart + k] = held[i, k] - m * common[k]
+            usual = m * common[k] + memory[o + M.apart + k]
+            along += memory[o + M.direction + k] * (usual - memory[o + M.felt + k])
         size = 0.0
+        if stands:
+            along = 0.0
         for k in range(3):
             forces[i, k] = memory[o + M.felt + k] + along * memory[o + M.direction + k]
             size += forces[i, k] ** 2
@@ -176,7 +192,8 @@ class Momentum(ObservationPart, Delays):
     ``D = w (P - Phat)`` with ``P = sum m_i v_i + m_L v_L`` and ``dPhat/dt = sum u_i - M g e3 + D`` (a momentum observer,
     De Luca and Mattone 2003): cables pull at both of their ends, so no tension enters. A wrong mass of the load is part of D.
     An observer of each drone's own momentum finds what it feels beyond thrust, weight and the wanted pull: across the cable that is wind,
-    along it nobody can tell wind from tension. That part is filled in from the wind per mass that all feel alike.
+    along it nobody can tell wind from tension. That part is filled in from the wind per mass that all feel alike, and from what
+    each drone felt beside that while its cable was slack, if it ever was.
     """
 
     kernel = _observe

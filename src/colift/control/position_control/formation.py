@@ -43,6 +43,10 @@ Drag = Annotated[float, Field(ge=0.0, le=1.0)]
 
 FULL = 0.95
 """Share of a drone's largest thrust that it is asked for."""
+CALM = 0.6
+"""Share of the bandwidth and of ``max_push`` that is left while the load stands: when the tensions go, no attitude follows faster."""
+IDLE = 0.1
+"""Thrust of a drone that stands on the ground, over its weight."""
 UNKNOWN = 2.5
 """Most thrust where nobody knows it, over the weight of a drone and its share of the load."""
 
@@ -67,6 +71,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     reference, wanted, forces = sees.reference, sees.wanted_ends, sees.estimated_forces
     T, alpha, nominal = sees.received_tensions, sees.received_directions, sees.nominal_forces
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
+    spans, courses = sees.spans, sees.courses
     rates, planned = writes.desired_rates, memory[M.planned : M.planned + 3]
     n = x.shape[0]
     g, m_L, omega = params[P.g], params[P.m_L], params[P.frequency]
@@ -75,12 +80,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     short_x = forces[n, 0] - m_L * reference[2, 0]
     short_y = forces[n, 1] - m_L * reference[2, 1]
     short_z = forces[n, 2] - m_L * (reference[2, 2] + g)
+    stands = sees.standing[n] != 0.0
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
         d = o + M.direction
         height += (x[i, 2] - ends[i, 0, 2]) / n
-        swinging = n <= 2 and math.isnan(nominal[i, 0, 0])
+        swinging = n <= 2 and not stands and math.isnan(nominal[i, 0, 0])
         if swinging:
             _ask_for(i, m_L / n, wanted, dt, keep, memory, o)
         change = memory[o + M.change : o + M.change + 9]
@@ -94,35 +100,47 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             swing(i, alpha, T, change, omega, dt, memory, d, reach)
         else:
             lead(i, alpha, nominal, omega, dt, memory, d, reach)
+            if n <= 2 and stands:  # from here the pull goes on once the load swings
+                for k in range(3):
+                    memory[d + 9 + k], memory[d + 12 + k] = T[i] * memory[d + k], 0.0
         short_x -= T[i] * memory[d]
         short_y -= T[i] * memory[d + 1]
         short_z -= T[i] * memory[d + 2]
-    short = (short_x, short_y, short_z)
-    k1, k2, k3, k4 = params[P.velocity], params[P.stiffness], 0.0, 0.0
-    if n <= 2:
+    # A load that stands is carried by the ground.
+    short = (0.0, 0.0, 0.0) if stands else (short_x, short_y, short_z)
+    soft = CALM if stands else 1.0
+    k1, k2, k3, k4 = soft * params[P.velocity], soft * soft * params[P.stiffness], 0.0, 0.0
+    upright, lift = k1, k2
+    if n <= 2 and not stands:
         L = params[P.rows + P.L]
         k1, k2, k3, k4 = pendulum_gains(g, min(max(height, 0.2 * L), 2.0 * L), params[P.band])
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
         m, L = params[p + P.m], params[p + P.L]
+        span, rate, bend = L + spans[i, 0], spans[i, 1], spans[i, 2]
+        led = not math.isnan(courses[i, 0, 0])
         push = 0.0
         for k in range(3):
             a = o + M.direction + k
-            y = x[i, k] - (wanted[i, 0, k] - L * memory[a])
-            y_dot = v[i, k] - (wanted[i, 1, k] - L * memory[a + 3])
+            y = x[i, k] - (wanted[i, 0, k] - span * memory[a])
+            y_dot = v[i, k] - (wanted[i, 1, k] - span * memory[a + 3] - rate * memory[a])
+            if led:
+                y, y_dot = x[i, k] - courses[i, 0, k], v[i, k] - courses[i, 1, k]
             if k < 2:
                 u[i, k] = -k1 * y_dot - k2 * y - k3 * (ends[i, 1, k] - wanted[i, 1, k])
                 u[i, k] -= k4 * (ends[i, 0, k] - wanted[i, 0, k])
             else:
-                u[i, k] = -params[P.velocity] * y_dot - params[P.stiffness] * y
+                u[i, k] = -upright * y_dot - lift * y
             push += u[i, k] * u[i, k]
         # No more than the attitude can follow: it needs long to turn from one bank to the other.
-        most = min(1.0, params[P.max_push] / math.sqrt(max(push, 1e-12)))
+        most = min(1.0, soft * params[P.max_push] / math.sqrt(max(push, 1e-12)))
         for k in range(3):
             a = o + M.direction + k
             # Where the load swings freely, the drone carries it along the cable that is there.
             pull = (ends[i, 0, k] - x[i, k]) / L if n <= 2 and k < 2 else memory[a]
-            needed = m * (wanted[i, 2, k] - L * memory[a + 6] + (g if k == 2 else 0.0))
+            turning = span * memory[a + 6] + 2.0 * rate * memory[a + 3] + bend * memory[a]
+            motion = courses[i, 2, k] if led else wanted[i, 2, k] - turning
+            needed = m * (motion + (g if k == 2 else 0.0))
             planned[k] = needed - T[i] * memory[a]
             known = T[i] * pull + forces[i, k] + m / params[P.total] * short[k]
             u[i, k] = needed + m * most * u[i, k] - known
@@ -130,7 +148,11 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         past = (wind[0] - v[i, 0], wind[1] - v[i, 1], wind[2] - v[i, 2])
         ux, uy, uz = rotors.thrust_for(u[i, 0], u[i, 1], u[i, 2], params[p + P.drag], past)
         u[i, 0], u[i, 1], u[i, 2] = ux, uy, uz
-        limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
+        if sees.standing[i] != 0.0:  # motors idle
+            for k in range(3):
+                u[i, k] = planned[k] = 0.0 if k < 2 else IDLE * m * g
+        else:
+            limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         fresh = memory[o + M.started] == 0.0
         memory[o + M.started] = 1.0

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
+from colift.kernel.phase import Phase
 from colift.kernel.ports import PORTS
 from colift.part import Part
 
@@ -15,11 +17,13 @@ Called each physics step, before the reference. ``clock[0]`` is the time that th
 clock; the loop makes those in time of them.
 """
 
-FLYING = 0.0
-"""``phase`` of a load in the air; other numbers are a part's own."""
+FLYING = float(Phase.FLY)
+"""``phase`` of a load that follows the reference; other numbers are those of :class:`colift.kernel.phase.Phase`."""
 
 
 class SupervisionPart(Part):
     """Base of all supervisors."""
 
     layer: ClassVar[str] = "supervision"
+    works_with: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Kinds of parts, by layer, that do what it asks for (beside ``external``); every kind of a layer that is not named."""

@@ -15,6 +15,7 @@ class Mark(NamedTuple):
 
 
 MARKS = {
+    "phase": Mark("M3 1.5L3 10.5M3 2L10 4.5L3 7", "info"),
     "command": Mark("M6 1.5Q10.5 1.5 10.5 6Q10.5 10.5 6 10.5Q1.5 10.5 1.5 6Q1.5 1.5 6 1.5Z", "good"),
     "change": Mark("M2 4L10 4M2 8L10 8", "good"),
     "fault": Mark("M2 2L10 10M10 2L2 10", "bad"),
