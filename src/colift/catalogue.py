@@ -75,11 +75,15 @@ TRACKING = {
 """The paper's cascade, in which the load's own controller brings it to its place, and the motors that it takes for granted."""
 
 
+LEADING = "lift"
+"""The supervisor that leads a team off the ground."""
+
+
 def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
     """The part of a layer that a mission with these sections does not name; None for a layer that must be named.
 
     Who asks for a load or position control of the paper's cascade gets the rest of it, too; nothing is predicted where
-    the sensors are ideal.
+    the sensors are ideal. Who starts on the ground is led from there.
     """
 
     def kind(of: str) -> Any:
@@ -88,8 +92,13 @@ def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
 
     if layer == "estimation" and kind("sensing") in (None, DEFAULT_KINDS["sensing"]):
         return "none"
-    if layer in TRACKING and any(kind(of) not in (None, own) for of, own in FORMATION.items()):
+    tracking = any(kind(of) not in (None, own) for of, own in FORMATION.items())
+    if layer in TRACKING and tracking:
         return TRACKING[layer]
+    start = sections.get("start")
+    stands = isinstance(start, Mapping) and start.get("on_ground") is True
+    if layer == "supervision" and stands and not tracking:
+        return LEADING
     return DEFAULT_KINDS.get(layer)
 
 

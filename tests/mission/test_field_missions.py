@@ -74,18 +74,39 @@ def test_a_load_let_go_without_ground_falls_for_ever():
     assert any("underground" in reason for reason in run.verdict.reasons)
 
 
-def test_a_team_that_cannot_take_off_is_no_pass():
-    """Without anything that leads it through the take-off."""
+def test_a_team_takes_off_from_the_ground_and_puts_its_load_down_again():
+    """Told that it stands on the ground, it is led from there and back."""
+    run = fly("s01_takeoff_ground", **{"start.on_ground": True, "supervision.fly": 11.0, "timing.duration": 60.0})  # fmt: skip
+    r = run.recording
+    assert run.verdict.ok, run.verdict.sentence
+    taut = [np.flatnonzero(r["tensions"][:, i] > 0.0)[0] for i in range(4)]
+    assert r["positions"][taut, range(4), 2].min() > 0.5  # the drones have risen before
+    assert run.metrics["lift_peak"] < 1.0
+    assert run.metrics["peak_tension_N"] < 3.0 * 0.225 * 9.81
+    assert r["load"][:, 0, 2].max() > 1.0
+    assert run.metrics["touch_speed_mps"] < 0.15
+    assert run.metrics["drone_touch_speed_mps"] < 0.15
+    assert run.metrics["placement_m"] < 0.01
+    assert np.abs(r["positions"][-1, :, 2]).max() < 1e-3
+    assert np.linalg.norm(r["positions"][-1] - r["load"][-1, 0], axis=1).max() < 1.0
+
+
+def test_a_team_that_nobody_leads_from_the_ground_is_no_pass():
+    """Its drones lie beside the load, turned over, as if taut cables held them."""
     run = fly("s01_takeoff_ground")
     # A load that falls with v presses itself in by v / (e w), and no deeper.
     assert run.metrics["min_height_m"] > -0.001 - run.metrics["touch_speed_mps"] / (np.e * 300.0)
     assert run.verdict.level in {"fail", "lost"}
 
 
-def test_three_tiny_drones_of_which_only_the_bodies_are_given_fly():
-    run = fly("s08_crazyflie_naive")
-    assert run.verdict.ok, run.verdict.reasons
-    assert late_error(run, 5.0) < 0.01
+def test_a_load_released_where_it_was_set_down_stays_there_and_the_drones_land():
+    run = fly("s01b_land_release", **{"supervision": {"kind": "lift", "fly": 5.0, "afterwards": "release"}, "fault": [], "timing.duration": 40.0})  # fmt: skip
+    r = run.recording
+    assert run.verdict.ok, run.verdict.sentence
+    assert not r["attached"][-1].any()
+    assert run.metrics["touch_speed_mps"] < 0.15
+    assert run.metrics["placement_m"] < 0.01
+    assert np.abs(r["positions"][-1, :, 2]).max() < 1e-3
 
 
 def test_drones_with_the_gains_of_others_are_told_lost():

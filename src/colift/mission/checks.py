@@ -116,7 +116,7 @@ def _supervision_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Pro
                 "nor of cables that are slack on purpose"
             )
             yield Problem("supervision.kind", kind_of(type(supervisor)), message)
-    if supervisor.works_with and frame.ground is None:
+    if supervisor.works_with and frame.ground is None and not frame.start.on_ground:
         message = 'needs a ground to take off from and to land on, but world.ground = "none"'
         yield Problem("supervision.kind", kind_of(type(supervisor)), message)
 

@@ -279,10 +279,11 @@ def energy_imbalance(r: Recording) -> float:
 
 @_metric
 def slack_time_s(r: Recording) -> float:
-    spent = r["slack_times"]
-    lies = rests(r)
-    rested = np.diff(spent, axis=0, prepend=np.zeros_like(spent[:1]))[lies] if lies.any() else 0.0
-    return float(sum(_largest(times) for times in spent.T)) - float(np.nansum(rested))
+    spent, lies = r["slack_times"], rests(r)
+    if not lies.any():
+        return float(sum(_largest(times) for times in spent.T))
+    grown = np.diff(spent, axis=0, prepend=np.zeros_like(spent[:1]))[~lies]
+    return float(np.nansum(np.maximum(grown, 0.0)))
 
 
 @_metric

@@ -18,7 +18,8 @@ def rests(recording: Recording) -> NDArray[np.bool_]:
         return found
     touching = np.flatnonzero(recording["ground_forces"][:, -1, 2] > 0.0)
     found[touching] = True
-    # A force is that of a step's begin: at the start of a flight on the ground there is none yet.
+    # A force is that of a step's begin, what else is recorded that of its end.
+    found[np.maximum(touching - 1, 0)] = True
     if touching.size and recording.time[touching[0]] - recording.time[0] <= BOUNCE:
         found[: touching[0]] = True
     for first, last in zip(touching[:-1].tolist(), touching[1:].tolist(), strict=True):

@@ -1,0 +1,224 @@
+"""Take-off, pick-up, set-down and landing, in closed loop: the supervisor of kind ``lift``."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import colift
+from colift.errors import MissionError
+from colift.flight.flight import Flight
+from colift.kernel.phase import Phase
+from colift.mission import load_mission
+from colift.mission.warnings import warnings_of
+
+ALL = [
+    Phase.STAND, Phase.CLIMB, Phase.HOOK, Phase.TENSION, Phase.RISE, Phase.FLY, Phase.LOWER, Phase.TOUCH,
+    Phase.UNLOAD, Phase.SLACKEN, Phase.LAND, Phase.DONE,
+]  # fmt: skip
+RELEASED = [Phase.RELEASE if phase == Phase.LAND else phase for phase in ALL]
+NOISY = {"timing.delay": 0.02, "sensing.kind": "noisy", "estimation.kind": "predictor"}
+SHORT = {"reference.position": [0.0, 0.0, 0.4], "supervision.fly": 0.5, "timing.duration": 45.0}
+
+
+def fly(name="take-off-and-land", **changes):
+    return colift.run(name, overrides={key.replace("__", "."): v for key, v in changes.items()})
+
+
+def phases(run):
+    """The phases in the order in which they came."""
+    found = run.recording["phase"][:, 0].astype(int)
+    return [Phase(found[k]) for k in (0, *(np.flatnonzero(np.diff(found)) + 1))]
+
+
+def check(run, order=ALL, *, peak=1.0, dragged=5e-3, placed=0.01, mass=0.08):
+    """The targets of a lift in calm air."""
+    found = run.metrics
+    assert phases(run) == order
+    assert run.verdict.ok, run.verdict.sentence
+    assert found["lift_peak"] <= peak
+    assert found["touch_peak"] <= 1.5
+    assert found["touch_speed_mps"] <= 0.15
+    assert found["drone_touch_speed_mps"] <= 0.15
+    assert abs(found["touch_height_m"]) <= 5e-3
+    assert found["dragged_m"] <= dragged
+    assert found["placement_m"] <= placed
+    assert found["weighed_mass_kg"] == pytest.approx(run.mission.true_team.load_mass, rel=mass)
+    assert found["slack_time_s"] <= 0.1
+    assert found["lost_drones"] == 0.0
+    return run
+
+
+def test_a_team_takes_off_lifts_its_load_sets_it_down_and_lands():
+    run = check(fly())
+    assert run.compiled
+    r = run.recording
+    # It stands at the end as it stood at first: drones beside the load, all at rest, motors idle.
+    assert r["load"][-1, 0, 2] == pytest.approx(0.0, abs=1e-3)
+    assert np.abs(r["positions"][-1, :, 2]).max() < 1e-3
+    assert np.abs(r["velocities"][-1]).max() < 1e-3
+    assert (r["standing"][-1] == 1.0).all()
+    assert (r["applied_thrusts"][-1] < 0.2 * 0.5 * 9.81).all()
+    distances = np.linalg.norm(r["positions"][-1] - r["load"][-1, 0], axis=1)
+    assert (distances < run.mission.team.cable_lengths).all()
+    # While it flies, the supervisor leaves everything to the others.
+    flying = r["phase"][:, 0] == Phase.FLY
+    assert (r["lift_share"][flying] == 1.0).all()
+    assert not r["standing"][flying].any()
+    assert (np.diff(r["clock"][flying, 0]) > 0.0).all()
+    assert (r["clock"][~flying, 1] == 0.0).all()
+    assert [m.text for m in r.moments if m.kind == "phase"][:3] == [
+        "On the ground", "Drones climb", "Cables are drawn taut",
+    ]  # fmt: skip
+
+
+def test_spans_and_reference_have_the_derivatives_that_are_told():
+    """Over the whole flight, but for the step in which the touch-down is told."""
+    flight = Flight(load_mission("take-off-and-land", {**SHORT, "timing.recording": 0.001}))
+    r = flight.run()
+    dt = 0.001
+    told = np.flatnonzero(r["phase"][:, 0] == Phase.UNLOAD)[0]
+    calm = np.abs(np.arange(len(r.time)) - told) > 3
+    for values, tolerance in ((r["spans"], 0.02), (r["reference"].transpose(0, 2, 1), 0.02)):
+        for order in range(values.shape[2] - 1):
+            change = np.gradient(values[:, :, order], dt, axis=0)
+            off = np.abs(change - values[:, :, order + 1]).max(axis=1)
+            changes = np.flatnonzero(np.diff(r["phase"][:, 0]))
+            inner = calm & (np.abs(np.arange(len(r.time))[:, None] - changes).min(axis=1) > 3)
+            scale = max(np.abs(values[:, :, order + 1]).max(), 0.1)
+            assert np.median(off[inner]) <= 1e-3 * scale
+            assert np.quantile(off[inner], 0.999) <= tolerance * scale
+
+
+def test_a_released_load_stays_where_it_was_put_and_the_drones_land_farther_off():
+    run = check(fly("pick-up-and-place"), RELEASED)
+    r = run.recording
+    assert r["load"][-1, 0, :2] == pytest.approx([2.0, 0.5], abs=0.01)
+    assert not r["attached"][-1].any()
+    let_go = np.flatnonzero(r["attached"][:, 0] == 0.0)[0]
+    assert r["phase"][let_go, 0] == Phase.RELEASE
+    assert r["ground_forces"][let_go, -1, 2] > 0.0
+    distances = np.linalg.norm(r["positions"][-1] - r["load"][-1, 0], axis=1)
+    assert (distances > 1.1 * run.mission.team.cable_lengths).all()
+    assert not any(moment.kind == "fault" for moment in r.moments)
+
+
+@pytest.mark.parametrize("name", ["crazyflie-trio", "heavy-lift"])
+def test_smallest_and_largest_drones(name):
+    check(fly(name))
+
+
+@pytest.mark.parametrize("count", [2, 8])
+def test_few_drones_and_many(count):
+    check(fly(drones__count=count, load__mass=0.225 if count < 8 else 0.6))
+
+
+def test_one_drone_alone():
+    """Its cable bears all of the weight."""
+    bound = {"max": 1.1}
+    check(fly(drones__count=1, criteria__lift_peak=bound), peak=1.1)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_a_load_of_another_mass_than_told_is_weighed(factor):
+    check(fly(truth__load_mass_factor=factor, **SHORT))
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.05])
+def test_cables_of_another_length_than_told_are_measured(factor):
+    r = check(fly(truth__cable_length_factor=factor, **SHORT)).recording
+    flying = r["phase"][:, 0] == Phase.FLY
+    assert r["spans"][flying, :, 0] == pytest.approx(factor - 1.0, abs=0.01)
+
+
+def test_drones_of_other_masses_than_told_are_made_up_for():
+    check(fly(truth__drone_mass_factor=[1.1, 1.0, 0.95, 1.05], **SHORT))
+
+
+def test_late_and_noisy_sensors_and_a_push_of_a_twentieth_of_the_weight():
+    push = [{"kind": "push", "force": [0.11, 0.0, 0.0], "duration": 1e3}]
+    run = fly(**NOISY, **SHORT, disturbance=push)
+    check(run, dragged=8e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", ["elastic-cables", "bead-cables"])
+def test_cables_that_stretch(plant):
+    check(fly(plant__kind=plant, **SHORT))
+
+
+@pytest.mark.slow
+def test_on_the_plant_of_others():
+    pytest.importorskip("mujoco")
+    check(fly(plant__kind="mujoco", **SHORT), peak=1.5)
+
+
+@pytest.mark.parametrize("changes", [
+    {"truth__load_mass_factor": 4.0}, {"truth__cable_length_factor": 1.2},
+])  # fmt: skip
+def test_a_load_that_cannot_be_lifted_is_given_up_and_the_drones_land(changes):
+    """Too heavy; or on cables so long that none pulls where it should."""
+    run = fly(**changes)
+    order = phases(run)
+    assert Phase.RISE not in order
+    assert order[-3:] == [Phase.SLACKEN, Phase.LAND, Phase.DONE]
+    assert run.recording["load"][:, 0, 2].max() < 5e-3
+    assert run.metrics["drone_touch_speed_mps"] <= 0.15
+    assert np.isnan(run.metrics["weighed_mass_kg"])
+
+
+def test_a_flight_that_begins_in_the_air_ends_on_the_ground():
+    changes = {"start.on_ground": False, "supervision.kind": "lift", **SHORT}
+    run = colift.run("take-off-and-land", overrides=changes)
+    assert phases(run) == [Phase.FLY, *ALL[6:]]
+    assert run.metrics["touch_speed_mps"] <= 0.15
+    assert run.metrics["placement_m"] <= 0.01
+
+
+def test_a_reference_that_begins_on_the_ground_is_flown_above_it():
+    points = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.5], [0.5, 0.0, 0.0]]
+    reference = {"kind": "waypoints", "points": points, "travel": 3.0, "hold": 0.5}
+    run = check(fly(reference=reference, supervision__fly=7.5))
+    flying = run.recording["phase"][:, 0] == Phase.FLY
+    assert run.recording["load"][flying, 0, 2].min() > 0.1
+
+
+def test_without_a_supervisor_nothing_is_led():
+    r = fly("hover", timing__duration=0.2).recording
+    assert (r["lift_share"] == 1.0).all()
+    assert not r["standing"].any()
+    assert not r["spans"].any()
+    assert not r["unhooked"].any()
+    assert not r["phase"].any()
+
+
+# ---------------------------------------------------------------- what is refused and warned of
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"position_control.kind": "pid"}, 'needs position_control.kind = "formation"'),
+        ({"observation.kind": "none"}, 'needs observation.kind = "momentum"'),
+        ({"world.ground": "none", "start.on_ground": False}, "needs a ground"),
+    ],
+)
+def test_what_does_not_go_with_it_is_refused(changes, said):
+    with pytest.raises(MissionError, match=said):
+        load_mission("take-off-and-land", changes)
+
+
+def test_a_team_on_the_ground_is_led_unless_the_mission_says_otherwise():
+    table = {"name": "t", "start": {"on_ground": True}, "reference": {"kind": "hover"}}
+    assert load_mission(table).kinds["supervision"] == "lift"
+    assert load_mission(table, {"supervision.kind": "none"}).kinds["supervision"] == "none"
+    assert load_mission(table, {"load_control.kind": "pid"}).kinds["supervision"] == "none"
+    assert load_mission(table, {"start.on_ground": False}).kinds["supervision"] == "none"
+
+
+def test_a_reference_that_is_not_at_rest_when_it_ends_is_warned_of():
+    spiral = {"reference": {"kind": "spiral"}, "supervision.fly": 7.0}
+    (warning,) = warnings_of(load_mission("take-off-and-land", spiral))
+    assert warning.path == "supervision.fly"
+    assert "moves at" in warning.message
+    assert warnings_of(load_mission("take-off-and-land")) == []
