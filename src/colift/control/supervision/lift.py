@@ -38,7 +38,7 @@ MEMORY = Layout(
         "started": 1, "phase": 1, "since": 1, "clock": 1, "place": 3, "ground": 1, "begin": 3,
         "goal": 3, "way": 1, "stage": 1, "share": 1, "rising": 1, "held": 3, "weighed": 1,
         "momentum": 1, "normal": 1, "normal_mean": 1, "normal_spread": 1, "signed": 1, "slow": 1,
-        "count": 1, "sum": 1, "top": 1, "above": 1,
+        "count": 1, "pull": 3, "top": 1, "above": 1,
     },
     drone={
         "own": 3, "felt": 3, "thrust": 1, "bias": 3, "start": 3, "span": 3, "want": 1, "mean": 3,
@@ -173,7 +173,9 @@ def _make_up(i, rate, memory):  # type: ignore[no-untyped-def]
 def _go(memory, number, time):  # type: ignore[no-untyped-def]
     memory[M.phase] = number
     memory[M.since] = time
-    memory[M.stage] = memory[M.signed] = memory[M.slow] = memory[M.count] = memory[M.sum] = 0.0
+    memory[M.stage] = memory[M.signed] = memory[M.slow] = memory[M.count] = 0.0
+    for k in range(3):
+        memory[M.pull + k] = 0.0
 
 
 @inline
@@ -351,24 +353,29 @@ def _tension(dt, sees, params, memory):  # type: ignore[no-untyped-def]
         memory[M.share] = memory[M.rising] * min(max(1.0 - back / params[P.g], 0.5), 1.5)
         if memory[M.slow] > SWING_IN:
             memory[M.count] += 1.0
-            weight = 0.0
+            for k in range(3):
+                pull = 0.0
+                for i in range(n):
+                    o = M.rows + M.width * i
+                    pull += memory[o + M.bias + k] - memory[o + M.felt + k]
+                memory[M.pull + k] += (pull - memory[M.pull + k]) / memory[M.count]
             for i in range(n):
                 o = M.rows + M.width * i
                 distance, _ = _pull(i, sees, memory)
                 if memory[M.count] == 1.0:
                     memory[o + M.length] = distance
                 memory[o + M.length] += (distance - memory[o + M.length]) / memory[M.count]
-                weight += memory[o + M.bias + 2] - memory[o + M.felt + 2]
-            memory[M.sum] += (weight - memory[M.sum]) / memory[M.count]
         if memory[M.slow] >= WEIGH:
             memory[M.stage], memory[M.slow] = 2.0, 0.0
-            if abs(memory[M.sum] / (memory[M.share] * W) - 1.0) > AMISS:
+            if abs(memory[M.pull + 2] / (memory[M.share] * W) - 1.0) > AMISS:
                 return -1.0
-            memory[M.weighed] = memory[M.sum] / params[P.g]
+            memory[M.weighed] = memory[M.pull + 2] / params[P.g]
             memory[M.rising] = memory[M.share]
         return 0.0
     part = min(memory[M.slow] / HAND_OVER, 1.0)
-    memory[M.held + 2] = part * (W - memory[M.sum])
+    # What the cables do not bear of the weight that is told, and what they bear aside.
+    for k in range(3):
+        memory[M.held + k] = part * ((W if k == 2 else 0.0) - memory[M.pull + k])
     memory[M.share] = memory[M.rising] * W / (W - memory[M.held + 2])
     return 1.0 if part >= 1.0 else 0.0
 
