@@ -103,6 +103,20 @@ def test_a_released_load_stays_where_it_was_put_and_the_drones_land_farther_off(
     assert not any(moment.kind == "fault" for moment in r.moments)
 
 
+def test_a_load_is_picked_up_again_where_it_was_set_down():
+    points = [[0.0, 0.0, 0.4], [0.5, 0.0, 0.4], [1.0, 0.5, 0.4]]
+    reference = {"kind": "waypoints", "points": points, "travel": 3.0, "hold": 1.0}
+    places = [[0.5, 0.0], [0.8, 0.4]]
+    run = fly(reference=reference, supervision__fly=4.5, supervision__set_down=places, timing__duration=80.0)  # fmt: skip
+    check(run, [*ALL[:-2], *ALL[2:]])
+    r = run.recording
+    flying = r["phase"][:, 0] == Phase.FLY
+    assert r["clock"][flying, 0].max() == pytest.approx(9.0, abs=0.01)
+    for place, last in zip(places, np.flatnonzero(np.diff(r["phase"][:, 0]) == Phase.HOOK - Phase.SLACKEN), strict=False):  # fmt: skip
+        assert r["load"][last, 0, :2] == pytest.approx(place, abs=0.01)
+    assert r["load"][-1, 0, :2] == pytest.approx(places[-1], abs=0.01)
+
+
 @pytest.mark.parametrize("name", ["crazyflie-trio", "heavy-lift"])
 def test_smallest_and_largest_drones(name):
     check(fly(name))

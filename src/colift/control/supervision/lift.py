@@ -19,17 +19,21 @@ from colift.kernel.phase import Phase
 from colift.part import Setup, Vector
 from colift.team import Team
 
+MOST_ROUNDS = 8
+"""Most places where a load is set down in one flight."""
+
 PARAMS = Layout(
     team={
-        "g": 1, "m_L": 1, "feel": 1, "learn": 1, "delay": 1, "lag": 1, "fly": 1, "aside": 1,
-        "place": 2, "speed": 1, "touch": 1, "release": 1, "ground": 1, "hook": 1, "climb": 1,
+        "g": 1, "m_L": 1, "feel": 1, "learn": 1, "delay": 1, "lag": 1, "fly": 1, "rounds": 1,
+        "aside": 1,
+        "places": 2 * MOST_ROUNDS, "speed": 1, "touch": 1, "release": 1, "ground": 1, "hook": 1, "climb": 1,
         "margin": 1, "rise": 1, "stiff": 1, "damp": 1,
         "clear": 1,
     },
     drone={"m": 1, "L": 1, "drag": 1},
 )  # fmt: skip
-"""``feel``: bandwidth of the observers, ``learn``: with which what they feel is made up for, 1/s; ``aside``: whether the load is
-set down at ``place``; speeds of the way (``speed``), of ``touch``-down and to ``hook``, m/s; time to ``climb``, s; ``margin``: height
+"""``feel``: bandwidth of the observers, ``learn``: with which what they feel is made up for, 1/s; ``rounds``: how often the load is
+lifted, ``fly``: time of the reference in each, s; ``aside``: whether it is set down at ``places``; speeds of the way (``speed``), of ``touch``-down and to ``hook``, m/s; time to ``climb``, s; ``margin``: height
 from which on it goes down at the speed of touch-down, m; time in which the lift share would ``rise`` by 1, s; how a lifted load is held,
 as accelerations of the load by the lift share: per height (``stiff``) and speed (``damp``); height
 above the ground at which the reference begins at least (``clear``), m."""
@@ -38,14 +42,14 @@ MEMORY = Layout(
         "started": 1, "phase": 1, "since": 1, "clock": 1, "place": 3, "ground": 1, "begin": 3,
         "goal": 3, "way": 1, "stage": 1, "share": 1, "rising": 1, "held": 3, "weighed": 1,
         "momentum": 1, "normal": 1, "normal_mean": 1, "normal_spread": 1, "signed": 1, "slow": 1,
-        "count": 1, "pull": 3, "top": 1, "above": 1,
+        "count": 1, "pull": 3, "round": 1, "top": 1, "above": 1,
     },
     drone={
         "own": 3, "felt": 3, "thrust": 1, "bias": 3, "start": 3, "span": 3, "want": 1, "mean": 3,
         "spread": 1, "sign": 1, "hooked": 1, "length": 1, "down": 1, "usual": 3,
     },
 )  # fmt: skip
-"""Of the team: ``phase``, ``since`` when; the ``clock``; ``place`` of the load on the ``ground``; the load's way from ``begin`` to ``goal``, its
+"""Of the team: ``phase``, ``since`` when; the ``round``, from 0; the ``clock``; ``place`` of the load on the ``ground``; the load's way from ``begin`` to ``goal``, its
 time ``way`` and ``stage``; lift ``share``; force ``held`` on the load and ``weighed`` mass; height ``top`` at which it counted as lifted;
 by how much the reference is flown ``above`` itself; observer of the vertical
 ``momentum`` and the ``normal`` force that it finds, mean and mean square of its noise; time for which a sign lasts (``signed``) and of
@@ -97,6 +101,8 @@ WINDOW = 0.03
 """Height within which the ground is looked for, m."""
 USUAL = 0.5
 """Time constant of what counts as usual in flight, s."""
+EAGER = 2.0
+"""Speed with which the drones go on as the tensions vanish, over that of touch-down."""
 UNLOADING, VANISH, FADE = 0.6, 0.02, 0.3
 """Time to unload, time in which the tensions vanish, time constant of the drones' speed then, s."""
 PEAK = 35.0 / 16.0
@@ -105,6 +111,8 @@ TOUCHED = 0.3
 """Force of the ground over a drone's weight at which its motors stop."""
 SINK = 0.05
 """Speed with which a drone comes onto the ground, m/s."""
+REST = 0.3
+"""Least time for the drones to calm down once the cables are slack, s."""
 MOVING = 0.02
 """Speed of a reference from which on it does not rest, m/s."""
 RODS = ("rigid-cables",)
@@ -179,8 +187,22 @@ def _go(memory, number, time):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _give_up(time, memory):  # type: ignore[no-untyped-def]
-    """Slacken the cables of a load that cannot be lifted."""
+def _begin_to_hook(n, time, memory):  # type: ignore[no-untyped-def]
+    _go(memory, HOOK, time)
+    memory[M.share] = 0.0
+    for k in range(3):
+        memory[M.held + k] = 0.0
+    for i in range(n):
+        o = M.rows + M.width * i
+        memory[o + M.hooked] = memory[o + M.sign] = memory[o + M.spread] = memory[o + M.want] = 0.0
+        for k in range(3):
+            memory[o + M.mean + k] = 0.0
+
+
+@inline
+def _give_up(time, params, memory):  # type: ignore[no-untyped-def]
+    """Slacken the cables of a load that cannot be lifted, for good."""
+    memory[M.round] = params[P.rounds]
     _go(memory, UNLOAD, time)
     memory[M.rising] = memory[M.share]
 
@@ -496,19 +518,15 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             _arc(s, s1, s2, place, start, end, courses[i])
             _make_up(i, 1.0 - decay(dt, 1.0 / params[P.learn]), memory)
         if s >= 1.0 and _formed(sees, params, memory):
-            _go(memory, HOOK, t)
+            _begin_to_hook(n, t, memory)
             for i in range(n):
-                o = M.rows + M.width * i
-                memory[o + M.hooked] = memory[o + M.sign] = memory[o + M.spread] = 0.0
-                for k in range(3):
-                    courses[i, 0, k] = math.nan
-                    memory[o + M.mean + k] = 0.0
+                courses[i, 0, 0] = math.nan
     elif now_in == HOOK:
         result = _hook(time, dt, sees, params, memory)
         if result > 0.0:
             _go(memory, TENSION, t)
         elif result < 0.0:
-            _give_up(t, memory)
+            _give_up(t, params, memory)
     elif now_in == TENSION:
         result = _tension(dt, sees, params, memory)
         if result > 0.0:
@@ -522,7 +540,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 for k in range(3):
                     memory[o + M.usual + k] = memory[o + M.bias + k]
         elif result < 0.0:
-            _give_up(t, memory)
+            _give_up(t, params, memory)
     elif now_in == RISE:
         part = min(time / HAND_OVER, 1.0)
         memory[M.share] = memory[M.rising] + part * (1.0 - memory[M.rising])
@@ -536,14 +554,15 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             for i in range(n):
                 memory[M.rows + M.width * i + M.want] = 0.0
     elif now_in == FLY:
-        memory[M.clock] = time
-        rate = 1.0
+        flown = params[P.fly] * memory[M.round]
+        memory[M.clock], rate = flown + time, 1.0
         if time >= params[P.fly]:
-            memory[M.clock], rate = params[P.fly], 0.0
+            memory[M.clock], rate = flown + params[P.fly], 0.0
             _go(memory, LOWER, t)
             ax, ay = home[0], home[1]
             if params[P.aside] != 0.0:
-                ax, ay = params[P.place], params[P.place + 1]
+                spot = P.places + 2 * int(memory[M.round])
+                ax, ay = params[spot], params[spot + 1]
             high = home[2] + memory[M.above]
             _set_off(memory, (home[0], home[1], high), (ax, ay, high), params[P.speed], 0.0)
     elif now_in == LOWER:
@@ -562,7 +581,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             memory[M.rising] = memory[M.share]
             for i in range(n):
                 o = M.rows + M.width * i
-                memory[o + M.span + 1] = -params[P.touch]
+                memory[o + M.span + 1] = -EAGER * params[P.touch]
                 memory[o + M.span + 2] = 0.0
                 for k in range(3):
                     memory[o + M.bias + k] = memory[o + M.usual + k]
@@ -574,11 +593,13 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     elif now_in == UNLOAD:
         memory[M.share] = memory[M.rising] * max(1.0 - time / VANISH, 0.0)
         for i in range(n):
-            memory[M.rows + M.width * i + M.want] = -params[P.touch] * math.exp(-time / FADE)
+            memory[M.rows + M.width * i + M.want] = (
+                -EAGER * params[P.touch] * math.exp(-time / FADE)
+            )
         if time >= UNLOADING:
             _go(memory, SLACKEN, t)
     elif now_in == SLACKEN:
-        done = True
+        done = time >= REST
         for i in range(n):
             o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
             pace = (NEAR - 1.0) * L - memory[o + M.span]
@@ -586,7 +607,10 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             done = done and abs(pace) < 0.01 * L
             if abs(pace) < 0.05 * L:
                 _make_up(i, 1.0 - decay(dt, 1.0 / params[P.learn]), memory)
-        if done:
+        memory[M.round] += 1.0 if done else 0.0
+        if done and memory[M.round] < params[P.rounds]:
+            _begin_to_hook(n, t, memory)
+        elif done:
             _go(memory, RELEASE if params[P.release] != 0.0 else LAND, t)
             for i in range(n):
                 o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
@@ -637,6 +661,10 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         _on_the_way(memory, t - memory[M.since] if moving else memory[M.way], shift, home)
 
 
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Place = tuple[Coordinate, Coordinate]
+
+
 class Lift(SupervisionPart, Delays):
     """From the ground to the ground: drones climb, cables come taut, the load is lifted, flown, set down, drones land.
 
@@ -655,10 +683,13 @@ class Lift(SupervisionPart, Delays):
         "agents": ("central",),
     }
 
-    fly: Annotated[float, Field(ge=0.0, le=1e6)] = 10.0
+    fly: Annotated[float, Field(gt=0.0, le=1e6)] = 10.0
     """For how long the reference is flown, s; it should rest by then."""
-    set_down: tuple[float, float] | None = None
-    """Where the load is set down, world x and y, m; below where the reference ends where not given."""
+    set_down: Place | Annotated[list[Place], Field(min_length=1, max_length=MOST_ROUNDS)] | None = (
+        None
+    )
+    """Where the load is set down, world x and y, m; below where the reference ends where not given. Of a list one after the other: at
+    each but the last the load is picked up again, and the reference goes on for another ``fly``."""
     afterwards: Literal["land", "release"] = "land"
     """Whether the drones land with their cables hooked, or release the load before."""
     speed: Annotated[float, Field(gt=0.0, le=10.0)] = 0.4
@@ -670,12 +701,13 @@ class Lift(SupervisionPart, Delays):
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
-        speed = np.linalg.norm(mission.reference.sample(np.array([self.fly]), mission.team)[0, 1])
+        rounds = len(self.set_down) if isinstance(self.set_down, list) else 1
+        ends = self.fly * np.arange(1, rounds + 1)
+        velocity = mission.reference.sample(ends, mission.team)[:, 1]
+        speed = float(np.linalg.norm(velocity, axis=1).max())
         if speed > MOVING:
-            yield (
-                "fly",
-                f"ends the reference where it moves at {speed:.2g} m/s: the load is stopped there at once",
-            )
+            message = f"ends the reference where it moves at {speed:.2g} m/s: the load is stopped there at once"
+            yield "fly", message
         kind = mission.kinds["plant"]
         if kind in RODS:
             message = f'slackens cables, but those of plant.kind = "{kind}" are rods; set plant.kind = "slack-cables"'
@@ -687,12 +719,14 @@ class Lift(SupervisionPart, Delays):
         pull = team.load_mass * team.gravity / float(team.masses.sum())
         ratio = 1.0 + float(team.masses.sum()) / team.load_mass
         touch = self.touch_speed or (0.06 if pull > 2.0 else 0.08)
-        x, y = self.set_down or (0.0, 0.0)
+        places = self.set_down if isinstance(self.set_down, list) else [self.set_down or (0.0, 0.0)]
+        spots = np.zeros((MOST_ROUNDS, 2))
+        spots[: len(places)] = places
         drag = [d if math.isfinite(d) else 0.0 for d in team.rotor_drags]
         return PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, feel=1.5 * band, learn=0.4 * band,
             delay=self.delay if self.predicted else 0.0, lag=self.lag, fly=self.fly,
-            aside=float(self.set_down is not None), place=(x, y), speed=self.speed, touch=touch,
+            rounds=len(places), aside=float(self.set_down is not None), places=spots.ravel(), speed=self.speed, touch=touch,
             release=float(self.afterwards == "release"), ground=self.ground,
             hook=0.01 * max(1.0, math.sqrt(L)), climb=max(2.0, 5.0 * math.sqrt(L)),
             rise=max(RAISE, SLOWLY / band), stiff=0.1 * band * band * ratio,
