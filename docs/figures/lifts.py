@@ -75,18 +75,23 @@ def shown(value, scale=1.0, digits=2):
     return "-" if value is None else f"{scale * value:.{digits}f}"
 
 
-rows = []
-for name, ok, count, worst, (low, high) in stored(__file__, measure):
-    rows.append(
-        [
-            name,
-            f"{ok} of {count}",
-            f"{shown(worst['lift_peak'])}, {shown(worst['touch_peak'])}",
-            f"{shown(worst['touch_speed_mps'], digits=3)}, {shown(worst['drone_touch_speed_mps'], digits=3)}",
-            shown(worst["dragged_m"], 1e3, 1),
-            shown(worst["touch_height_m"], 1e3, 1),
-            shown(worst["placement_m"], 1e3, 1),
-            f"{low:.2f}" if f"{low:.2f}" == f"{high:.2f}" else f"{low:.2f} to {high:.2f}",
-        ]
-    )
-fill("ground.md", "lifts", table(HEADER, rows))
+def main():
+    rows = []
+    for name, ok, count, worst, (low, high) in stored(__file__, measure):
+        rows.append(
+            [
+                name,
+                f"{ok} of {count}",
+                f"{shown(worst['lift_peak'])}, {shown(worst['touch_peak'])}",
+                f"{shown(worst['touch_speed_mps'], digits=3)}, {shown(worst['drone_touch_speed_mps'], digits=3)}",
+                shown(worst["dragged_m"], 1e3, 1),
+                shown(worst["touch_height_m"], 1e3, 1),
+                shown(worst["placement_m"], 1e3, 1),
+                f"{low:.2f}" if f"{low:.2f}" == f"{high:.2f}" else f"{low:.2f} to {high:.2f}",
+            ]
+        )
+    fill("ground.md", "lifts", table(HEADER, rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -43,7 +43,7 @@ def synthetic(n=4, duration=20.0, period=0.01):
     ):  # fmt: skip
         arrays["phase"][begin:stop] = phase
     arrays["peak_tensions"][130, 0] = 11.0
-    arrays["weighed_mass"][160:] = 0.2
+    arrays["lifted_mass"][160:] = 0.2
     arrays["saturated_times"][-1] = 0.25
     arrays["desired_tensions"][:] = arrays["tensions"] - 0.25
     arrays["directions"][:] = ring(n, np.radians(40.0))

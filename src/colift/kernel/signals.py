@@ -105,7 +105,7 @@ SIGNALS = (
     Signal("lift_share", (1,), "1", "s", "-", "share of the wanted tensions that the cables are given", initial=1.0, writer="supervision"),
     Signal("spans", ("n", 3), "m, m/s, m/s^2", "r_i - L_i", "-", "distance that each drone keeps from its cable's end, less the cable's length; two derivatives", writer="supervision"),
     Signal("unhooked", ("n",), "1", "-", "-", "1 for each cable that is told to let go of the load", writer="supervision"),
-    Signal("weighed_mass", (1,), "kg", "-", "-", "mass of the load as weighed at lift-off; 0 where nobody weighs it", writer="supervision"),
+    Signal("lifted_mass", (1,), "kg", "-", "-", "mass of the load as weighed at lift-off; 0 where nobody weighs it", writer="supervision"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 

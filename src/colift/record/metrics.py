@@ -352,7 +352,7 @@ def placement_m(r: Recording) -> float:
 
 @_metric
 def weighed_mass_kg(r: Recording) -> float:
-    weighed = r["weighed_mass"][:, 0]
+    weighed = r["lifted_mass"][:, 0]
     return float(weighed[-1]) if weighed[-1] > 0.0 else math.nan
 
 

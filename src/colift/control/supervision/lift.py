@@ -635,7 +635,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     writes.phase[0] = now_in
     writes.clock[0], writes.clock[1] = memory[M.clock], rate
     writes.lift_share[0] = memory[M.share]
-    writes.weighed_mass[0] = memory[M.weighed]
+    writes.lifted_mass[0] = memory[M.weighed]
     standing[n] = 0.0 if airborne else 1.0
     for k in range(3):
         writes.held_forces[n, k] = memory[M.held + k]
