@@ -65,15 +65,19 @@ DEFAULT_KINDS = {
 }
 """Parts of the layers that a mission need not name; but see :func:`default_kind`."""
 
-FORMATION = {layer: DEFAULT_KINDS[layer] for layer in ("load_control", "position_control")}
-"""The cascade in which the load hangs on the formation that the drones hold: these two go together."""
+FORMATION = {
+    layer: DEFAULT_KINDS[layer] for layer in ("load_control", "observation", "position_control")
+}
+"""The cascade in which the load hangs on the formation that the drones hold: these go together."""
 
 TRACKING = {
-    "load_control": "pid", "observation": "none", "position_control": "pid", "attitude_control": "manifold",
-    "actuation": "ideal",
+    "estimation": "none", "load_control": "pid", "observation": "none", "position_control": "pid",
+    "attitude_control": "manifold", "actuation": "ideal",
 }  # fmt: skip
 """The paper's cascade, in which the load's own controller brings it to its place, and the motors that it takes for granted."""
 
+UNNUMBERED = ("count", "cable_length")
+"""What a mission may say of its drones and leave them the paper's."""
 
 LEADING = "lift"
 """The supervisor that leads a team off the ground."""
@@ -82,21 +86,29 @@ LEADING = "lift"
 def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
     """The part of a layer that a mission with these sections does not name; None for a layer that must be named.
 
-    Who asks for a load or position control of the paper's cascade gets the rest of it, too; nothing is predicted where
-    the sensors are ideal. Who starts on the ground is led from there.
+    Who asks for a load or position control of the paper's cascade gets the rest of it, too. So does, without asking, who says
+    nothing of three drones or more that would make them others than the paper's, and starts in the air. Nothing is
+    predicted where the sensors are ideal. Who starts on the ground is led from there.
     """
 
-    def kind(of: str) -> Any:
+    def table(of: str) -> Mapping[str, Any]:
         section = sections.get(of)
-        return section.get("kind") if isinstance(section, Mapping) else None
+        return section if isinstance(section, Mapping) else {}
 
-    if layer == "estimation" and kind("sensing") in (None, DEFAULT_KINDS["sensing"]):
-        return "none"
-    tracking = any(kind(of) not in (None, own) for of, own in FORMATION.items())
+    named = {of: table(of).get("kind") for of in (*FORMATION, "supervision", "sensing")}
+    stands = table("start").get("on_ground") is True
+    asked = any(
+        named[of] not in (None, FORMATION[of]) for of in ("load_control", "position_control")
+    )
+    formation = stands or any(named[of] == own for of, own in FORMATION.items())
+    drones = table("drones")
+    count = drones.get("count", 4)
+    papers = drones.keys() <= {*UNNUMBERED} and isinstance(count, int) and count >= 3
+    tracking = asked or (papers and not formation and named["supervision"] != LEADING)
     if layer in TRACKING and tracking:
         return TRACKING[layer]
-    start = sections.get("start")
-    stands = isinstance(start, Mapping) and start.get("on_ground") is True
+    if layer == "estimation" and named["sensing"] in (None, DEFAULT_KINDS["sensing"]):
+        return "none"
     if layer == "supervision" and stands and not tracking:
         return LEADING
     return DEFAULT_KINDS.get(layer)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
-from colift.part import Setup, Vector
+from colift.part import Declared, Setup, Vector
 from colift.team import Team
 
 FINEST = 0.5e-3
@@ -284,12 +284,17 @@ class Predictor(EstimationPart):
     remembers = MEMORY
     delays_declared = ("delay", "attitude_delay")
 
+    @classmethod
+    def declared(cls, mission: Declared) -> dict[str, Any]:
+        rotors = mission.actuation
+        return super().declared(mission) | ({} if rotors is None else {"lag": rotors.motor_lag()})
+
     delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
     """Age of the measured positions and velocities, s; ``timing.delay`` where the mission has one."""
     attitude_delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
     """Age of the measured attitudes, s; ``timing.delay`` where the mission has one."""
     lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
-    """Time constant of the motors, s."""
+    """Time constant of the motors, s; that of the mission's where not given."""
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.005
     """Sampling period of positions and velocities, s."""
     position_noise: Noise = 0.002
