@@ -20,6 +20,8 @@ SOME = (
     "calm;wind;all, load +50 %;all, load -50 %;cable cut;drone dead, on its cable;one motor dead;"
     "drone's sensors stuck for good"
 )
+MISSION = "real-world-adaptive"
+"""The mission that the page is about."""
 CAMPAIGNS = {
     "single": ([], 1),
     "storm": (["--conditions", "* in wind;* in all, load +50 %;* in all, load -50 %"], 4),
@@ -43,7 +45,7 @@ def fly(seeds, folder):
     found = {}
     for name, (arguments, part) in CAMPAIGNS.items():
         asked = ["--seeds", str(max(1, seeds // part)), "--first-seed", str(FIRST_SEED), *arguments]
-        command = [sys.executable, "-m", "colift", "stress", *asked, "--replays", "0"]
+        command = [sys.executable, "-m", "colift", "stress", MISSION, *asked, "--replays", "0"]
         subprocess.run([*command, "--out", str(folder / name)], check=True)
         result = json.loads((folder / name / "stress.json").read_text())
         found[name] = {
@@ -101,7 +103,7 @@ def said(result):
     )
     first, last = result["seeds"]
     passed = shares.text(result["passed"], result["flights"])
-    return f"`colift stress {words}`: seeds {first} to {last}, {passed} flights pass.\n\n"
+    return f"`colift stress {result['mission']} {words}`: seeds {first} to {last}, {passed} flights pass.\n\n"
 
 
 def share(cell):

@@ -52,7 +52,7 @@ def test_answers_are_those_of_the_flight(kind):
             allocator.lose(1)
             assert allocator.drones == (0, 2, 3)
         if time == pytest.approx(1.0):
-            cone = math.radians(mission.start.cone_deg)
+            cone = mission.start_cone
             gap = widest_gap(flight["directions"][row - 1][[0, 2, 3]], cone)
             assert allocator.join(direction=gap) == 1
             assert allocator.drones == (0, 1, 2, 3)

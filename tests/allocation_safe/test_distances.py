@@ -244,7 +244,7 @@ def test_no_hostile_force_breaks_a_distance(n: int, stretch: float, seed: int) -
     assert cables.min() >= 0.2 - 1e-12
     assert (pairwise_angles(directions) >= angles - 1e-9).all()
     turned = np.linalg.norm(np.diff(directions, axis=0), axis=-1).max()
-    assert turned <= part.max_rate * allocator.dt
+    assert turned <= part.turn_rate(allocator.team) * allocator.dt
     if seed == 1:  # without a barrier that keeps off, drones come as near as they may
         for kind, found, least in (("drones", drones, 0.5), ("cable", cables, 0.2)):
             assert not bits & BITS[kind] or found.min() < least + 0.02
@@ -379,7 +379,7 @@ def test_a_setting_changes_in_flight_without_a_jump() -> None:
             before = answer.directions
             answer = allocator.allocate([0.1, 0.0, 2.2])
             turned = np.linalg.norm(answer.directions - before, axis=1).max()
-            assert turned <= allocator.part.max_rate * allocator.dt + 1e-9
+            assert turned <= allocator.part.turn_rate(allocator.team) * allocator.dt + 1e-9
         assert answer.status.ok
         assert allocator.part.distances(allocator.team, answer.directions)[0].min() >= apart
 

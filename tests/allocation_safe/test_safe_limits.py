@@ -44,7 +44,7 @@ def assert_limits(allocator: SafeAllocator, answer, before) -> None:
     if allocator.n > 1:
         assert pairwise_angles(answer.directions).min() >= math.radians(part.min_angle_deg) - 1e-5
     chord = np.linalg.norm(answer.directions - before, axis=1).max()
-    assert chord <= 2.0 * math.sin(0.5 * part.max_rate * allocator.dt) + 1e-9
+    assert chord <= 2.0 * math.sin(0.5 * part.turn_rate(allocator.team) * allocator.dt) + 1e-9
 
 
 def forces(kind: str, weight: float, cycles: int):
@@ -160,7 +160,11 @@ def test_weights_never_make_a_reachable_force_give_way(n, ratio, heavy):
     weight, rng = allocator.team.load_mass * G, np.random.default_rng(n)
     part, missed = allocator.part, 0
     team = allocator.team
-    reach = (part.tension_floors(team), part.tension_caps(team), part.max_rate * allocator.dt)
+    reach = (
+        part.tension_floors(team),
+        part.tension_caps(team),
+        part.turn_rate(allocator.team) * allocator.dt,
+    )
     directions = first(n)
     allocator.reset(directions=directions)
     for k in range(500):
@@ -206,7 +210,7 @@ def test_settings_change_between_calls_without_a_jump():
             before = answer.directions
             answer = allocator.allocate([0.1, 0.0, 2.2])
             chord = np.linalg.norm(answer.directions - before, axis=1).max()
-            assert chord <= allocator.part.max_rate * allocator.dt + 1e-9
+            assert chord <= allocator.part.turn_rate(allocator.team) * allocator.dt + 1e-9
             assert answer.force_residual <= 1e-8
         assert np.degrees(pairwise_angles(answer.directions).min()) >= angle - 1e-6
 

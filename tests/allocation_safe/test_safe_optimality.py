@@ -21,7 +21,7 @@ def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
     alpha = w / T[:, None]
     gram = alpha @ alpha.T
     i, j = np.triu_indices(team.n, 1)
-    rho, delta = part.settling / allocator.dt, part.max_rate * allocator.dt
+    rho, delta = part.settling / allocator.dt, part.turn_rate(allocator.team) * allocator.dt
     least = math.radians(part.min_angle_deg)
     edge = math.cos(least + max(part._reach(team.n, least), 2 * delta))
     fade = np.clip(((before @ before.T)[i, j] - edge) / (math.cos(least) - edge), 0.0, 1.0)
@@ -36,7 +36,7 @@ def barrier_problem(allocator: SafeAllocator, before, home, acceleration, w):
         thrust[:, 2] - math.cos(math.radians(part.max_tilt_deg)) * size,
     ]
     rate = np.sum(before * alpha, axis=1) - math.cos(delta)
-    value = 0.5 * T @ T + part.mu / sigma**2 * np.sum(gram[i, j] ** 2)
+    value = 0.5 * T @ T + part.penalty(allocator.team) / sigma**2 * np.sum(gram[i, j] ** 2)
     value += rho * np.sum(1.0 - np.sum(alpha * home, axis=1))
     value -= part.barrier * sum(np.sum(np.log(g)) for g in limits)
     value -= 0.5 * RATE_BARRIER * max(rho, 1.0) * delta**2 * np.sum(np.log(rate))
@@ -51,7 +51,7 @@ def turned(allocator, before, facing, force):
     part, dt = allocator.part, allocator.dt
     way = aim - facing
     size = np.linalg.norm(way)
-    share = min(dt / (part.turning + dt), TURN * part.max_rate * dt / size)
+    share = min(dt / (part.turning + dt), TURN * part.turn_rate(allocator.team) * dt / size)
     fresh = facing + share / (1.0 + (size / JUMP) ** 4) * way
     fresh /= np.linalg.norm(fresh)
     turn = rotation_between(facing, fresh).T

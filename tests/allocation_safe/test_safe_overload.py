@@ -52,7 +52,7 @@ def given(allocator: SafeAllocator, force: np.ndarray, cycles: int) -> np.ndarra
         assert np.degrees(np.arccos(-alpha[:, 2])).max() <= part.max_cone_deg + 1e-6
         assert np.degrees(pairwise_angles(alpha)).min() >= part.min_angle_deg - 1e-6
         chord = np.linalg.norm(alpha - before, axis=1).max()
-        assert chord <= 2.0 * np.sin(0.5 * part.max_rate * allocator.dt) + 1e-9
+        assert chord <= 2.0 * np.sin(0.5 * part.turn_rate(allocator.team) * allocator.dt) + 1e-9
         if np.linalg.norm(forces[-1] - force) > 1e-8:
             assert answer.status is Status.FORCE_REDUCED
         before = alpha.copy()
