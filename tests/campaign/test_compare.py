@@ -50,12 +50,12 @@ def test_a_setting_may_be_that_of_one_or_of_all() -> None:
 
 
 def test_an_allocator_may_fly_as_in_the_mission() -> None:
-    flown = contest(["safe", "sqp"], ["real-world"], [0], as_in_mission=True)
-    assert flown["safe", "real-world"].allocation == load_mission("real-world").allocation
-    sqp = flown["sqp", "real-world"].allocation
+    flown = contest(["safe", "sqp"], ["real-world-adaptive"], [0], as_in_mission=True)
+    assert flown["safe", "real-world-adaptive"].allocation == load_mission("real-world-adaptive").allocation
+    sqp = flown["sqp", "real-world-adaptive"].allocation
     assert sqp == type(sqp)()
-    plain = contest(["safe"], ["real-world"], [0])["safe", "real-world"].allocation
-    assert plain != load_mission("real-world").allocation
+    plain = contest(["safe"], ["real-world-adaptive"], [0])["safe", "real-world-adaptive"].allocation
+    assert plain != load_mission("real-world-adaptive").allocation
 
 
 def test_the_spread_is_swept_over_whatever_else_is_set() -> None:

@@ -63,8 +63,8 @@ def test_a_fault_happens_in_the_weather_named_behind_it():
 
 def test_the_worst_weather_is_the_mission_that_was_made_for_it():
     """The mission and the condition are written apart, so that either may be changed; knowingly."""
-    own = load_mission("real-world")
-    (case,) = stress.cases("real-world", ["all, load +50 %"], [], [], [0])
+    own = load_mission("real-world-adaptive")
+    (case,) = stress.cases("real-world-adaptive", ["all, load +50 %"], [], [], [0])
     theirs = load_mission(case.mission, case.overrides)
     assert theirs.resolved() == own.resolved()
 
@@ -102,7 +102,7 @@ LAYERS_WITH_LAG = ("estimation", "load_control", "position_control", "attitude_c
 
 def test_motors_fly_in_every_condition_and_their_lag_is_told():
     for condition in stress.condition_names():
-        (case,) = stress.cases("real-world", [condition], [], [], [0])
+        (case,) = stress.cases("real-world-adaptive", [condition], [], [], [0])
         loaded = case.load()
         assert loaded.kinds["actuation"] == "motors"
         for layer in LAYERS_WITH_LAG:
@@ -112,7 +112,7 @@ def test_motors_fly_in_every_condition_and_their_lag_is_told():
 
 
 def test_a_mission_on_ideal_rotors_gets_motors_and_one_with_motors_keeps_its_own():
-    ideal = load_mission("real-world", {"actuation": {}, "load_control.lag": 0.01}).resolved()
+    ideal = load_mission("real-world-adaptive", {"actuation": {}, "load_control.lag": 0.01}).resolved()
     for layer in set(LAYERS_WITH_LAG) - {"load_control"}:
         ideal[layer]["lag"] = 0.0
     found = load_mission(ideal, stress.motors(load_mission(ideal)))
