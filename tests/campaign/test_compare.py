@@ -51,10 +51,15 @@ def test_a_setting_may_be_that_of_one_or_of_all() -> None:
 
 def test_an_allocator_may_fly_as_in_the_mission() -> None:
     flown = contest(["safe", "sqp"], ["real-world-adaptive"], [0], as_in_mission=True)
-    assert flown["safe", "real-world-adaptive"].allocation == load_mission("real-world-adaptive").allocation
+    assert (
+        flown["safe", "real-world-adaptive"].allocation
+        == load_mission("real-world-adaptive").allocation
+    )
     sqp = flown["sqp", "real-world-adaptive"].allocation
     assert sqp == type(sqp)()
-    plain = contest(["safe"], ["real-world-adaptive"], [0])["safe", "real-world-adaptive"].allocation
+    plain = contest(["safe"], ["real-world-adaptive"], [0])[
+        "safe", "real-world-adaptive"
+    ].allocation
     assert plain != load_mission("real-world-adaptive").allocation
 
 

@@ -112,7 +112,9 @@ def test_motors_fly_in_every_condition_and_their_lag_is_told():
 
 
 def test_a_mission_on_ideal_rotors_gets_motors_and_one_with_motors_keeps_its_own():
-    ideal = load_mission("real-world-adaptive", {"actuation": {}, "load_control.lag": 0.01}).resolved()
+    ideal = load_mission(
+        "real-world-adaptive", {"actuation": {}, "load_control.lag": 0.01}
+    ).resolved()
     for layer in set(LAYERS_WITH_LAG) - {"load_control"}:
         ideal[layer]["lag"] = 0.0
     found = load_mission(ideal, stress.motors(load_mission(ideal)))

@@ -159,7 +159,8 @@ def test_what_is_not_told_is_usual_and_shown_as_derived():
 
 def test_numbers_that_the_motors_say_are_the_drones_too():
     given = {"max_thrust": 2.5, "time_constant": 0.03, "arm_length": 0.15}
-    found = mission(actuation={"kind": "motors", **given})
+    own = {"mass": 0.5, "inertia": [0.02, 0.02, 0.04]}
+    found = mission(own, actuation={"kind": "motors", **given})
     assert np.all(found.team.max_thrusts == 10.0)
     assert np.all(found.team.motor_lags == 0.03)
     assert found.allocation.max_thrust == pytest.approx(9.5)

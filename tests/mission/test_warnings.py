@@ -124,7 +124,7 @@ def test_the_growth_of_the_loop_is_that_of_a_simulation(delay, lag):
 
 def test_gains_near_what_sampling_bears_are_warned_of_and_those_above_diverge():
     J = 0.02
-    changes = {"drones.inertia": [J, J, J], "attitude_control.beta": [1e-6] * 3,
+    changes = {"load_control.kind": "pid", "drones.inertia": [J, J, J], "attitude_control.beta": [1e-6] * 3,
                "attitude_control.rho": [2.0] * 3, "timing.attitude_control": 0.01}  # fmt: skip
 
     def gain(ratio):
@@ -164,7 +164,7 @@ def test_thin_thrust_and_what_is_really_carried():
     assert warned({**motors, "actuation.max_thrust": 1.6}) == []
     (thin,) = warned({**motors, "actuation.max_thrust": 1.45})
     assert thin.startswith("actuation.max_thrust: leaves 5.")
-    assert "needs 5.47 N of its 5.8 N" in thin
+    assert "needs 5.462 N of its 5.8 N" in thin
     strong = {**motors, "actuation.max_thrust": 1.6}
     (heavy,) = warned({**strong, "truth.load_mass_factor": 4.0})
     assert heavy.startswith(

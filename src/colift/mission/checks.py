@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from colift.control.allocation.base import Allocation, AllocatorPart
-from colift.control.allocation.limits.hover import hover_conflicts
+from colift.control.allocation.base import AllocatorPart
+from colift.control.allocation.limits.hover import hovering
 from colift.control.supervision.base import SupervisionPart
 from colift.errors import Problem, UnknownNameError
 from colift.kernel.ports import MAX_DISTURBANCES
@@ -22,7 +22,7 @@ from colift.mission.forecast import forecast
 from colift.mission.grounding import ground_checks
 from colift.mission.schema import Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
-from colift.team import Team, contact
+from colift.team import contact
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
@@ -197,22 +197,6 @@ def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
         value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
         message = f"must leave the drones (drones.radius) apart: {found[1].format(*drones)}"
         yield Problem(f"start.{field}", value, message.replace("touched", "touch"))
-
-
-def hovering(
-    team: Team, allocation: AllocatorPart, thrusts: Array, directions: Array, period: float
-) -> tuple[Allocation, dict[str, str]]:
-    """A team in hover as its allocator settles it from ``directions`` (n, 3), and by layer why that does not hold the load.
-
-    ``thrusts`` (n,): what the motors of each drone give, N; ``period`` of the allocator, s.
-    """
-    hover = allocation.hover(team, directions, period)
-    conflicts = hover_conflicts(team, hover, thrusts)
-    if "allocation" in conflicts:
-        steep = allocation.with_any_thrust(team).hover(team, directions, period)
-        weak = hover_conflicts(team, steep, thrusts)
-        conflicts = weak if "actuation" in weak else conflicts
-    return hover, conflicts
 
 
 def hover_checks(

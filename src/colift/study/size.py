@@ -23,11 +23,11 @@ from colift.control.allocation.limits.feasibility import (
     limits_of,
     widest_formation,
 )
+from colift.control.allocation.limits.hover import hovering
 from colift.control.allocation.safe import Safe
 from colift.errors import ColiftError, SettingError
 from colift.flight.flight import Flight
 from colift.kernel.math import shares
-from colift.mission.checks import hovering
 from colift.mission.forecast import forecast
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission

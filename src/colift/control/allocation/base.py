@@ -112,7 +112,7 @@ class AllocatorPart(Part):
         return ""
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
-        from colift.control.allocation.limits.hover import hover_conflicts  # which reads answers
+        from colift.control.allocation.limits.hover import hovering  # which reads answers
 
         drones = mission.first_drones()
         told, real = mission.team.of(drones), mission.true_team.of(drones)
@@ -122,9 +122,11 @@ class AllocatorPart(Part):
             real.load_mass <= told.load_mass and np.all(real.masses <= told.masses)
         ):
             return
-        hover = self.of(drones).hover(real, mission.start_directions(), mission.timing.allocation)
         given = mission.actuation.of(drones).thrust_limits(real)
-        for message in hover_conflicts(real, hover, given).values():
+        _, conflicts = hovering(
+            real, self.of(drones), given, mission.start_directions(), mission.timing.allocation
+        )
+        for message in conflicts.values():
             yield "kind", f"with what the drones really weigh and carry (truth, events) {message}"
 
     def binding(self, team: Team, actuation: Motors) -> list[str]:

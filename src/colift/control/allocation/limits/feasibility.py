@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from colift.control.allocation.limits import distance
 from colift.control.allocation.limits.heaviest import Limits, best_tensions, extreme
-from colift.control.allocation.limits.hover import hover_conflicts
+from colift.control.allocation.limits.hover import hovering
 from colift.errors import SettingError
 from colift.team import Team
 from colift.team.geometry import pairwise_angles, ring
@@ -162,7 +162,7 @@ def feasibility(
     starts = formations(n, limits)
     if start is None:
         start = widest_formation(n, limits.cone, enough=limits.widest + math.radians(2.0))[0]
-    hover = settings.hover(team, start, dt)
+    hover, found = hovering(team, settings, motors, start, dt)
     heaviest, lightest = 0.0, math.nan
     binding: tuple[Binding, ...] = ()
     if len(starts):
@@ -175,7 +175,6 @@ def feasibility(
             if is_within(limits, overloaded):
                 heaviest = max(heaviest, np.nan_to_num(best_tensions(limits, overloaded)[0]))
     if not conflicts:
-        found = hover_conflicts(team, hover, motors)
         if "allocation" in found and binding:
             found["allocation"] += f"; what limits: {', '.join(map(str, binding))}"
         conflicts = list(found.values())

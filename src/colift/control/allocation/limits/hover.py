@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.control.allocation.base import Allocation, Status
+from colift.control.allocation.base import Allocation, AllocatorPart, Status
 from colift.team import Team
 
 Array = NDArray[np.float64]
@@ -52,3 +52,19 @@ def hover_conflicts(team: Team, hover: Allocation, thrusts: Array) -> dict[str, 
             f"{tilt:.3g} degrees from the vertical"
         )
     return found
+
+
+def hovering(
+    team: Team, allocation: AllocatorPart, thrusts: Array, directions: Array, period: float
+) -> tuple[Allocation, dict[str, str]]:
+    """A team in hover as its allocator settles it from ``directions`` (n, 3), and by layer why that does not hold the load.
+
+    ``thrusts`` (n,): what the motors of each drone give, N; ``period`` of the allocator, s.
+    """
+    hover = allocation.hover(team, directions, period)
+    conflicts = hover_conflicts(team, hover, thrusts)
+    if "allocation" in conflicts:
+        steep = allocation.with_any_thrust(team).hover(team, directions, period)
+        weak = hover_conflicts(team, steep, thrusts)
+        conflicts = weak if "actuation" in weak else conflicts
+    return hover, conflicts
