@@ -124,7 +124,7 @@ def test_a_flight_that_has_ended_flies_on_no_more_and_goes_back_before_the_conta
 
 def test_drones_that_touch_from_the_start_are_refused() -> None:
     with pytest.raises(MissionError, match=r"start.cone_deg: .*drones 0 and 1 touch"):
-        load_mission({**HOVER, "drones": {"count": 4, "radius": 0.5}})
+        load_mission({**HOVER, "drones": {"count": 4, "radius": 0.5}, "start": {"cone_deg": 35.0}})
 
 
 def test_a_team_of_unknown_size_touches_nothing() -> None:

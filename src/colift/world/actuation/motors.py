@@ -27,6 +27,8 @@ Noise = Annotated[float, Field(ge=0.0, le=100.0)]
 
 RISE = 0.03
 """Time in which a motor whose largest thrust is known gets there from none, s."""
+INNER = 0.65
+"""Arm over radius of a drone of which only the radius is known, at most: rotors are about half as large as arms."""
 NOISE = 1.0 / 300.0
 """Standard deviation of such a motor's thrust over its largest."""
 
@@ -187,7 +189,8 @@ class Motors(ActuationPart):
     def left_open(self, team: Team) -> dict[str, Vector]:
         bodies = zip(team.masses.tolist(), team.inertias.tolist(), strict=True)
         usual = [vehicles.usual_arm(mass, tuple(inertia)) for mass, inertia in bodies]
-        arms = np.where(np.isfinite(team.arms), team.arms, usual)
+        inner = np.fmin(usual, INNER * team.radii)
+        arms = np.where(np.isfinite(team.arms), team.arms, inner)
         ratios = [vehicles.usual_torque_ratio(arm) for arm in arms.tolist()]
         known = np.isfinite(team.max_thrusts)
         weak = np.where(known, team.max_thrusts, vehicles.THRUST_PER_MASS * team.masses)
