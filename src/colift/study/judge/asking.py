@@ -37,7 +37,7 @@ from colift.record.metrics import mean
 from colift.record.recording import Recording
 from colift.team import Team
 from colift.team.geometry import pairwise_angles
-from colift.team.scaling import scaled_load, scaled_mu
+from colift.team.scaling import PAPER_MU, scaled_load, scaled_mu
 
 Array = NDArray[np.float64]
 
@@ -224,7 +224,7 @@ def parts_for(
         part = find("allocation", kind)
         fields = dict((settings or {}).get(kind, {}))
         if "mu" in part.model_fields:
-            fields.setdefault("mu", scaled_mu(n, part.model_fields["mu"].default))
+            fields.setdefault("mu", scaled_mu(n, part.model_fields["mu"].default or PAPER_MU))
         try:
             made = part.model_validate(fields)
         except ValidationError as error:
