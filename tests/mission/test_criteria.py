@@ -24,7 +24,7 @@ def test_a_mission_without_criteria_is_judged_by_the_defaults():
     verdict = judged({})
     assert [(each.metric, each.bound, each.asked) for each in verdict.judged] == [
         ("tracking_max_m", "<= 0.5", False),
-        ("min_height_m", ">= 0", False),
+        ("min_height_m", ">= -0.02", False),
         ("max_tilt_deg", "<= 90", False),
         ("min_angle_deg", ">= 30", False),  # what its allocator is asked for
     ]
