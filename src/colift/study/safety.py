@@ -329,7 +329,11 @@ SCALED = {"allocation.kind": "safe", "allocation.mu_scaling": "weight"}
 
 FLIGHTS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "spiral from rest, cables 7 deg apart": ("from-rest", {}, {}),
-    "one drone starts below the load": ("paper-spiral", {"start.directions": BELOW}, {}),
+    "one drone starts below the load": (
+        "paper-spiral",
+        {"start.directions": BELOW, "world.ground": "none"},
+        {},
+    ),
     "figure eight at 5 m/s^2": (
         "figure-eight",
         {"reference.length": 1.4, "reference.width": 0.7, "reference.period": 4.2},
