@@ -168,7 +168,6 @@ def _enough(numbers: Mapping[str, Any], drones: int | None, load: float | None) 
 
 
 def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
-    from colift.kernel.math import shares
     from colift.study import size as study
 
     crew, n = answer.crew, answer.crew.team.n
@@ -198,6 +197,19 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
     show_tables([("Heaviest load", ["air", "drone lost", "carried", "limit"], rows)])
     if answer.most["calm"].load == 0.0 and answer.asked is None:
         out.print(escape(answer.most["calm"].message), highlight=False)
+    _say_load(question, answer)
+    for line in study.remarks(answer):
+        out.print(escape(line), highlight=False)
+    if flights:
+        _say_flights(flights)
+
+
+def _say_load(question: Question, answer: Answer) -> None:
+    """What the load that is asked for, or the heaviest, leaves to spare; and how few drones carry it."""
+    from colift.study import size as study
+
+    crew, windy = answer.crew, answer.wind > 0.0
+    team = crew.team
     swinging = answer.others is not None and answer.others.team.n < study.STEADY
     load, asked = team.load_mass, answer.asked is not None
     if answer.held.ok or asked:
@@ -229,25 +241,27 @@ def _say(question: Question, answer: Answer, flights: Sequence[Flown]) -> None:
             f"if one may be lost: {many(answer.few_spare)}.",
             highlight=False,
         )
-    for line in study.remarks(answer):
-        out.print(escape(line), highlight=False)
-    if flights:
-        rows = [
-            [
-                each.reference, "each drone's" if each.cut else "none",
-                shares.text(each.good, each.flights), f"{each.farthest:.2f}" if each.good else "-", each.first_bad or "-",
-            ]
-            for each in flights
-        ]  # fmt: skip
-        show_tables(
-            [
-                (
-                    "Flown",
-                    ["reference", "cable cut", "good", "load off, m", "first that was not"],
-                    rows,
-                )
-            ]
-        )
+
+
+def _say_flights(flights: Sequence[Flown]) -> None:
+    from colift.kernel.math import shares
+
+    rows = [
+        [
+            each.reference, "each drone's" if each.cut else "none",
+            shares.text(each.good, each.flights), f"{each.farthest:.2f}" if each.good else "-", each.first_bad or "-",
+        ]
+        for each in flights
+    ]  # fmt: skip
+    show_tables(
+        [
+            (
+                "Flown",
+                ["reference", "cable cut", "good", "load off, m", "first that was not"],
+                rows,
+            )
+        ]
+    )
 
 
 def _held(found: Judgement, *, swinging: bool = False) -> list[str]:

@@ -471,6 +471,35 @@ def _percent(share: float, cycles: int) -> str:
     return f"{100 * share:.3f} ({shares.percent(low, high, 3).removesuffix(' %')})"
 
 
+def _with_distances(result: dict[str, Any]) -> tuple[str, list[str], list[list[str]]]:
+    """Title, header and rows of the attacks on distances."""
+    rows = [
+        [
+            str(ours["n"]),
+            ours["family"],
+            *(
+                f"{1e3 * found[room]:.0f}"
+                for room in ("drone_room", "cable_room")
+                for found in (ours, angles)
+            ),
+            _percent(ours["yield_share"], ours["cycles"]),
+            _percent(ours["avoidable_share"], ours["cycles"]),
+            *(f"{found['median_us']:.1f} / {found['p99_us']:.1f}" for found in (ours, angles)),
+            "holds" if ours["holds"] else "BROKEN",
+        ]
+        for ours, angles in zip(result["distances"][::2], result["distances"][1::2], strict=True)
+    ]
+    return (
+        "With least distances, cables of 0.6 to 1.4 m: smallest distance of drones from each other (taller ellipsoids) and from "
+        "others' cables less its limit, mm, with and without them",
+        [
+            "n", "forces", "drones", "angles only", "cables", "angles only", "yield %", "avoid %", "median / p99",
+            "angles only", "limits",
+        ],
+        rows,
+    )  # fmt: skip
+
+
 def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[str]]]]:
     """The result as titled tables: header and rows of text."""
     rows = []
@@ -506,31 +535,7 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[s
         ],
         rows,
     )
-    rows = [
-        [
-            str(ours["n"]),
-            ours["family"],
-            *(
-                f"{1e3 * found[room]:.0f}"
-                for room in ("drone_room", "cable_room")
-                for found in (ours, angles)
-            ),
-            _percent(ours["yield_share"], ours["cycles"]),
-            _percent(ours["avoidable_share"], ours["cycles"]),
-            *(f"{found['median_us']:.1f} / {found['p99_us']:.1f}" for found in (ours, angles)),
-            "holds" if ours["holds"] else "BROKEN",
-        ]
-        for ours, angles in zip(result["distances"][::2], result["distances"][1::2], strict=True)
-    ]
-    yield (
-        "With least distances, cables of 0.6 to 1.4 m: smallest distance of drones from each other (taller ellipsoids) and from "
-        "others' cables less its limit, mm, with and without them",
-        [
-            "n", "forces", "drones", "angles only", "cables", "angles only", "yield %", "avoid %", "median / p99",
-            "angles only", "limits",
-        ],
-        rows,
-    )  # fmt: skip
+    yield _with_distances(result)
     rows = [
         [
             f["title"],
