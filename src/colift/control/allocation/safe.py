@@ -651,7 +651,7 @@ class SafeAllocator(Allocator):
     def __init__(
         self,
         n: int | Team = 4,
-        mu: float = 0.15,
+        mu: float | None = None,
         min_angle_deg: float = 30.0,
         tension_min: float | list[float] | None = None,
         tension_max: float | list[float] | None = None,
