@@ -176,6 +176,7 @@ def test_a_falling_load_reaches_its_terminal_velocity():
     table["disturbance"] = [{"kind": "drag", "load_area": 0.02}]
     table["fault"] = [{"kind": "load-released", "at": 0.0}]
     table["start"] = {"cone_deg": 60.0}
+    table["world"] = {"ground": "none"}
     r = colift.run(table).recording
     terminal = np.sqrt(2.0 * 0.225 * 9.81 / (RHO * 0.02))
     np.testing.assert_allclose(

@@ -51,7 +51,8 @@ def error(recording):
 def test_a_dead_drone_hangs_from_the_load_or_falls():
     for with_cable in (True, False):
         fault = {"kind": "drone-lost", "with_cable": with_cable}
-        _, r = fly("ideal", fault, duration=AT + 1.0, detection__kind="none")
+        free = {"detection__kind": "none", "world__ground": "none"}
+        _, r = fly("ideal", fault, duration=AT + 1.0, **free)
         assert r.outcome == "completed"
         assert r["attached"][-1, 1] == float(with_cable)
         assert (r["motor_health"][-1, 1] == 0.0).all()
@@ -471,7 +472,7 @@ def test_no_false_alarm_in_a_storm(n):
     for seed in range(3):
         storm = {"disturbance.0.speed": 15.0, "disturbance.1.speed": 15.0, "seed": seed}
         storm |= {"drones.count": n, "truth.load_mass_factor": 1.0}
-        flight = Flight(load_mission("real-world", storm))
+        flight = Flight(load_mission("real-world", storm, must_fly=False))
         r = flight.run()
         assert flight.membership.found == []
         drones = r.mission.drones
@@ -530,7 +531,7 @@ def test_the_load_is_not_brought_down_while_the_rest_can():
 
 def test_weak_motors_bring_it_down_too():
     heavy = {"load.mass": 0.8, "allocation.tension_max": 8.0, "actuation.max_thrust": 1.8,
-             "allocation.mu": 1.2}  # fmt: skip
+             "allocation.mu": 1.2, "allocation.max_thrust": 100.0}  # fmt: skip
     # Four would be refused before flight, for they have no reserve; in flight they hold it.
     flight = Flight(load_mission(mission("real", n=4).resolved(), heavy, must_fly=False))
     assert cannot_carry(flight, [0, 1, 2, 3]) == ""

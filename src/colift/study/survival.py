@@ -95,7 +95,8 @@ def team_table(source: str | Mapping[str, Any], n: int) -> dict[str, Any]:
     Load, load controller and alignment penalty grow with the number; the start is a formation within the
     allocator's limits.
     """
-    table = load_mission(source).resolved()
+    mission = load_mission(source)
+    table = mission.resolved()
     count = table["drones"]["count"]
     growth = n / count
     table["drones"]["count"] = n
@@ -104,7 +105,7 @@ def team_table(source: str | Mapping[str, Any], n: int) -> dict[str, Any]:
         table["load_control"][gain] = [growth * value for value in table["load_control"][gain]]
     limits = table["allocation"]
     limits["mu"] = scaled_mu(n, limits["mu"], count, keep="mu over squared weight")
-    cone = np.radians(max(table["start"]["cone_deg"], 0.7 * limits["max_cone_deg"]))
+    cone = max(mission.start_cone, np.radians(0.7 * limits["max_cone_deg"]))
     apart = np.radians(limits["min_angle_deg"] + 2.0)
     table["start"]["directions"] = spread_formation(n, cone, apart).tolist()
     return table
