@@ -49,7 +49,8 @@ def test_four_drones_survive_the_loss_of_one():
 
 def test_a_load_that_is_let_go_is_no_survival():
     faults = {"released": {"kind": "load-released"}}
-    case = next(survival.cases(counts=(4,), times=(1.0,), faults=faults))
+    deep = load_mission("cut-in-flight", {"world.ground": "none"}).resolved()
+    case = next(survival.cases(deep, counts=(4,), times=(1.0,), faults=faults))
     result = survival.fly(case)
     assert not result.survived
     assert result.error > survival.ERROR

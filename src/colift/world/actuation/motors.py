@@ -195,7 +195,8 @@ class Motors(ActuationPart):
         known = np.isfinite(team.max_thrusts)
         weak = np.where(known, team.max_thrusts, vehicles.THRUST_PER_MASS * team.masses)
         given = self.max_thrust
-        most = 0.25 * weak if given is None else np.broadcast_to(np.asarray(given), team.n)
+        told = given is not None and np.size(given) in (1, team.n)
+        most = np.broadcast_to(np.asarray(given), team.n) if told else 0.25 * weak
         lags = np.where(np.isfinite(team.motor_lags), team.motor_lags, vehicles.USUAL_LAG)
         return {
             "arm_length": arms,
