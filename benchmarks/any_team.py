@@ -20,8 +20,10 @@ import numpy as np
 
 from colift.errors import MissionError
 from colift.flight.flight import Flight
+from colift.kernel.math import shares
 from colift.mission import load_mission
 from colift.record import metrics
+from colift.study.size import flaw_of
 
 DURATION = 40.0
 SEED = 100_000
@@ -91,22 +93,11 @@ def fly(job):
             return found
     recording = Flight(mission).run()
     numbers = metrics.compute(recording)
-    error = np.linalg.norm(metrics.tracking_error(recording), axis=1)
-    late = float(error[len(error) // 2 :].max())
-    angle = numbers["min_angle_deg"]
-    good = recording.outcome == "completed" and late < 0.1 * max(1.0, found["length"])
-    good = good and not numbers["lost_drones"] and not (found["n"] > 1 and angle <= 15.0)
+    flaw, worst = flaw_of(recording)
     return found | {
-        "good": bool(good), "outcome": recording.outcome, "late": late, "worst": float(error.max()), "angle": float(angle),
-        "slack": float(numbers["slack_time_s"]), "saturated": float(numbers["saturated_time_s"] or 0.0),
+        "good": not flaw, "flaw": flaw, "worst": worst, "slack": float(numbers["slack_time_s"]),
+        "saturated": float(numbers["saturated_time_s"]),
     }  # fmt: skip
-
-
-def wilson(k, n, z=1.96):
-    """Interval of a share of 95 %."""
-    p = k / n
-    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
 
 
 def main():
@@ -134,7 +125,7 @@ def main():
                 )
     flown = [each for each in found if not each["refused"]]
     good = sum(each["good"] for each in flown)
-    low, high = wilson(good, max(len(flown), 1))
+    low, high = shares.interval(good, max(len(flown), 1))
     verdicts = Counter((bool(e["refused"]), e.get("good")) for e in found)
     print(f"{len(found)} missions: {len(found) - len(flown)} refused; of {len(flown)} flown {good} well "
           f"({100 * good / max(len(flown), 1):.1f} %, 95 %: {100 * low:.1f} to {100 * high:.1f})")  # fmt: skip

@@ -148,16 +148,19 @@ class Part(BaseModel, metaclass=Refusing):
 
     def of(self, drones: Sequence[int]) -> Self:
         """Settings for the team of these drones: of values per drone, theirs; what was left to the team is left to this one."""
-        changed: dict[str, Any] = {
+        lists = {
             name: [value[drone] for drone in drones]
             for name in self.per_drone
             if isinstance(value := getattr(self, name), list)
         }
-        left = {*self.of_all} - self.model_fields_set
-        changed |= {name: None for name in left if getattr(self, name) is not None}
-        if not changed:
+        return (self.model_copy(update=lists) if lists else self).unsettled(self.of_all)
+
+    def unsettled(self, names: Iterable[str]) -> Self:
+        """The settings of which those of ``names`` that were not given are left to the team, again."""
+        left = {name: None for name in names if name not in self.model_fields_set}
+        if all(getattr(self, name) is None for name in left):
             return self
-        copy = self.model_copy(update=changed)
+        copy = self.model_copy(update=left)
         copy.model_fields_set.difference_update(left)
         return copy
 

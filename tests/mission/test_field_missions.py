@@ -36,7 +36,6 @@ def late_error(run, since):
 def test_an_offset_of_a_load_on_one_or_two_drones_decays(name):
     run = fly(name)
     assert late_error(run, 10.0) < 0.02
-    assert run.recording["drone_forces"].shape[1] == run.mission.drones.count <= 2
 
 
 @pytest.mark.parametrize("name", ["s03_two_drones", "s03b_one_drone"])

@@ -1,7 +1,7 @@
 """Before the flight: what the wind of a mission asks of its team, and the margins that are left.
 
 Of what the controllers are told, and of the disturbances that the mission names. Each number is a quotient or an angle that a
-stranger can check by hand; what they are worth is measured on random flights (``benchmarks/any_team.py``).
+stranger can check by hand. ``benchmarks/any_team.py --unasked`` flies what they refuse as well, and counts false alarms and misses.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.control.allocation.base import Allocation
-from colift.control.attitude_control.base import AttitudeControlPart
 from colift.part import Part
 from colift.team import Team
 from colift.world.disturbance.base import DisturbancePart
@@ -44,8 +43,6 @@ class Forecast:
         Of the force that holds the load, from the vertical, rad.
     offset : float
         By how much the load hangs aside of a place straight below its drones, m.
-    turning : float
-        Angular acceleration that the rotors give over the squared bandwidth of the body-rate loop; inf where that is not known.
 
     """
 
@@ -54,7 +51,6 @@ class Forecast:
     limits: Array
     lean: float
     offset: float
-    turning: float
 
     @property
     def thrust(self) -> float:
@@ -92,7 +88,6 @@ def forecast(
     hover: Allocation,
     limits: Array,
     disturbances: Sequence[Part],
-    attitude: Part,
 ) -> Forecast:
     """Judge a team that hovers as its allocator has it; ``limits`` (n,) is the thrust of each drone, N."""
     parts = [each for each in disturbances if isinstance(each, DisturbancePart)]
@@ -109,10 +104,8 @@ def forecast(
     up = needed[:, 2] - np.minimum(pushes[:-1, 2] + shares * pushes[-1, 2], 0.0)
     weight = max(team.load_mass * team.gravity, 1e-300)
     lean = math.atan2(math.hypot(pushes[-1, 0], pushes[-1, 1]), weight)
-    turning = attitude.turning(team) if isinstance(attitude, AttitudeControlPart) else math.inf
-    return Forecast(
-        wind, np.hypot(up, across), limits, lean, float(team.cable_lengths.max()) * math.tan(lean), turning
-    )  # fmt: skip
+    offset = float(team.cable_lengths.max()) * math.tan(lean)
+    return Forecast(wind, np.hypot(up, across), limits, lean, offset)
 
 
 def _pushes(team: Team, hover: Allocation, part: DisturbancePart, wind: Array) -> Array:

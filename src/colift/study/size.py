@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,8 @@ from colift.kernel.math import shares
 from colift.mission.forecast import forecast
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
-from colift.part import Part
 from colift.record import metrics
+from colift.record.recording import Recording
 from colift.study.campaign.plan import varied
 from colift.study.stress import motors
 from colift.team import Team
@@ -40,7 +40,6 @@ from colift.world.actuation.base import ActuationPart
 from colift.world.disturbance.base import DisturbancePart
 
 Array = NDArray[np.float64]
-P = TypeVar("P", bound=Part)
 
 AIR = 1.225
 """Density of air, kg/m^3, as in data sheets of rotors."""
@@ -111,7 +110,6 @@ class Crew:
     team: Team
     allocation: Safe
     actuation: ActuationPart
-    attitude: Part
     disturbances: tuple[DisturbancePart, ...]
     period: float
     """Of the allocator, s."""
@@ -133,10 +131,9 @@ class Crew:
         bound = mission.criteria.get("tracking_max_m")
         crew = cls(
             team=mission.team,
-            allocation=_unfilled(mission.allocation),
+            allocation=mission.allocation.unsettled(Safe.from_team),
             actuation=mission.actuation,
-            attitude=mission.attitude_control,
-            disturbances=tuple(_unfilled(part) for part in mission.disturbance),
+            disturbances=tuple(part.unsettled(part.from_team) for part in mission.disturbance),
             period=mission.timing.allocation,
             allowed=math.inf if bound is None or bound.max is None else bound.max,
         )
@@ -149,7 +146,6 @@ class Crew:
             team=self.team.of(drones),
             allocation=self.allocation.of(drones),
             actuation=self.actuation.of(drones),
-            attitude=self.attitude.of(drones),
             disturbances=tuple(part.of(drones) for part in self.disturbances),
         )
 
@@ -209,7 +205,7 @@ class Crew:
             return Judgement(False, name, message, none, none, limits, math.nan)
         hover, conflicts = self.settled()
         thrusts = team.hover_thrusts(hover.tensions, hover.directions)
-        ahead = forecast(team, hover, limits, self.disturbances, self.attitude)
+        ahead = forecast(team, hover, limits, self.disturbances)
         for layer, said in conflicts.items():
             limit = NAMES["max_thrust"] if layer == "actuation" else ""
             return Judgement(False, limit, said, none, none, limits, math.nan)
@@ -277,14 +273,6 @@ class Most:
 
 def _named(binding: Binding) -> str:
     return NAMES.get(binding.path.rpartition(".")[2], binding.path)
-
-
-def _unfilled(part: P) -> P:
-    """A part whose settings that were left to the team are left to it again."""
-    left = {name: None for name in part.from_team if name not in part.model_fields_set}
-    copy = part.model_copy(update=left)
-    copy.model_fields_set.difference_update(left)
-    return copy
 
 
 def spared(crew: Crew) -> Most:
@@ -698,19 +686,25 @@ def _flight(
         changes["detection"] = {"kind": "residuals"}
     mission = load_mission(question.source, layered(changes, question.overrides), must_fly=False)
     recording = Flight(varied(mission, seed)).run()
-    values = metrics.compute(recording)
     where = f"seed {seed}" + ("" if cut is None else f", cable {cut} cut")
+    flaw, worst = flaw_of(recording, lost=int(cut is not None))
+    return (f"{where}: {flaw}" if flaw else "", worst)
+
+
+def flaw_of(recording: Recording, lost: int = 0) -> tuple[str, float]:
+    """What was wrong with a flight that ``lost`` so many drones, empty where nothing was, and the most that its load was off, m."""
     if recording.outcome != "completed":
-        return f"{where}: {recording.outcome}", math.inf
+        return recording.outcome, math.inf
+    values = metrics.compute(recording)
     error = np.linalg.norm(metrics.tracking_error(recording), axis=1)
     worst = float(error.max())
     late = float(error[len(error) // 2 :].max())
-    allowed = NEAR * max(1.0, float(team.cable_lengths.max()))
+    allowed = NEAR * max(1.0, float(recording.mission.team.cable_lengths.max()))
     if not late <= allowed:
-        return f"{where}: the load is {late:.3g} m off, more than {allowed:.3g} m", worst
+        return f"the load is {late:.3g} m off, more than {allowed:.3g} m", worst
     gone = int(values["lost_drones"] or 0)
-    if gone != (cut is not None):
-        return f"{where}: {gone} drones were judged lost", worst
+    if gone != lost:
+        return f"{gone} drones were judged lost", worst
     if values["min_angle_deg"] <= ANGLE:
-        return f"{where}: two cables came within {values['min_angle_deg']:.3g} degrees", worst
+        return f"two cables came within {values['min_angle_deg']:.3g} degrees", worst
     return "", worst

@@ -25,6 +25,7 @@ from colift.control.allocation.base import (
 from colift.control.allocation.common.oracle import paper_objective
 from colift.control.allocation.limits import cycle, distance, newton, recovery
 from colift.control.allocation.limits import feasibility as feasible
+from colift.control.allocation.limits.hover import RESERVE
 from colift.control.allocation.paper import newton as paper
 from colift.errors import Problem, SettingError
 from colift.kernel.jit import kernel
@@ -223,8 +224,8 @@ GIVE_WAY = 20.0
 """Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
 LOW = 0.5
 """Least tension over a cable's share of the load's weight, where the drones' thrust is known and no limit is given."""
-MOST = 0.95
-"""Share of a drone's thrust that is planned with then: what hover must leave it to be controlled with."""
+MOST = 1.0 - RESERVE
+"""Share of a drone's thrust that is planned with then."""
 MU = 8.0
 """Weight of the alignment penalty over W^2 / n^3, for a load of weight W on n cables: a cone in which they stand wide apart."""
 RATE, SWINGING = 0.15, 1.0

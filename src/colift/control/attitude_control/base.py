@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import ClassVar
 
@@ -39,10 +38,6 @@ class AttitudeControlPart(Part):
     def made_up_for(self) -> tuple[float, float]:
         """Delay and lag that the law predicts away, s."""
         return 0.0, 0.0
-
-    def turning(self, team: Team) -> float:
-        """Least angular acceleration that a drone's rotors give, over the squared bandwidth of the rate loop; inf where not known."""
-        return math.inf
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.unstable(mission)

@@ -174,13 +174,6 @@ class DelayAware(AttitudeControlPart, Delays):
         rate = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
         return rate * team.inertias, np.zeros((team.n, 3)), np.tile(0.5 * rate, (team.n, 1))
 
-    def turning(self, team: Team) -> float:
-        known = np.isfinite(self.left_open(team)["max_acceleration"]).all()
-        if self.max_acceleration is None and not known:
-            return math.inf
-        most = float(np.min(self.settled("max_acceleration", team)))
-        return most / self.bandwidths().rate ** 2
-
     def made_up_for(self) -> tuple[float, float]:
         return (self.delay, self.lag) if self.predicted else (0.0, 0.0)
 

@@ -275,8 +275,7 @@ def _reel(i, dt, memory):  # type: ignore[no-untyped-def]
 def _formed(sees, params, memory):  # type: ignore[no-untyped-def]
     """Whether all drones are at rest at their places in the formation."""
     for i in range(sees.estimated_positions.shape[0]):
-        p, _o = P.rows + P.width * i, M.rows + M.width * i
-        L = params[p + P.L]
+        L = params[P.rows + P.width * i + P.L]
         away = fast = 0.0
         for k in range(3):
             place = memory[M.place + k] - NEAR * L * sees.received_directions[i, k]
