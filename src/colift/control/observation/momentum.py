@@ -12,7 +12,7 @@ from colift.control.observation.base import SIGNATURE, ObservationPart
 from colift.control.tuning import Delays
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion, rotors
+from colift.kernel.math import rotors
 from colift.kernel.math.small import solve_symmetric
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
@@ -103,24 +103,14 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             for k in range(3):
                 memory[o + M.own + k] = m * v[i, k]
         else:
-            # The thrust along the axis that is there, not the one that is wanted.
             thrust = lag * memory[o + M.thrust] + (1.0 - lag) * thrusts[i]
             memory[o + M.thrust] = thrust
-            qw, qx, qy, qz = quaternion.turn(
-                q[i, 0], q[i, 1], q[i, 2], q[i, 3],
-                Omega[i, 0] * delay, Omega[i, 1] * delay, Omega[i, 2] * delay,
-            )  # fmt: skip
-            axis = quaternion.third_axis(qw, qx, qy, qz)
             drag = params[P.rows + P.width * i + P.drag]
             pull_of_wind += drag * thrust
-            past = (
-                memory[M.wind] - v[i, 0],
-                memory[M.wind + 1] - v[i, 1],
-                memory[M.wind + 2] - v[i, 2],
-            )
-            blown = rotors.drag(thrust, axis, drag, past)
+            breeze = memory[M.wind : M.wind + 3]
+            force = rotors.force_of(i, thrust, q, Omega, delay, drag, breeze, v)
             for k in range(3):
-                known = thrust * axis[k] + blown[k] - (m * g if k == 2 else 0.0)
+                known = force[k] - (m * g if k == 2 else 0.0)
                 memory[M.momentum + k] += dt * known
                 pull = T[i] * memory[o + M.direction + k]
                 memory[o + M.own + k] += dt * (known + pull + memory[o + M.felt + k])

@@ -13,7 +13,7 @@ from colift.control.supervision.base import SIGNATURE, SupervisionPart
 from colift.control.tuning import Delays
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion, rotors
+from colift.kernel.math import rotors
 from colift.kernel.math.smooth import decay, phase, rest_to_rest
 from colift.kernel.phase import Phase
 from colift.part import Setup, Vector
@@ -140,16 +140,11 @@ def _feel(sees, params, memory, dt):  # type: ignore[no-untyped-def]
                 memory[o + M.own + k] = m * v[i, k]
         thrust = keep * memory[o + M.thrust] + (1.0 - keep) * thrusts[i]
         memory[o + M.thrust] = thrust
-        qw, qx, qy, qz = quaternion.turn(
-            q[i, 0], q[i, 1], q[i, 2], q[i, 3],
-            Omega[i, 0] * delay, Omega[i, 1] * delay, Omega[i, 2] * delay,
-        )  # fmt: skip
-        axis = quaternion.third_axis(qw, qx, qy, qz)
-        wind = sees.estimated_wind
-        past = (wind[0] - v[i, 0], wind[1] - v[i, 1], wind[2] - v[i, 2])
-        blown = rotors.drag(thrust, axis, params[p + P.drag], past)
+        force = rotors.force_of(
+            i, thrust, q, Omega, delay, params[p + P.drag], sees.estimated_wind, v
+        )
         for k in range(3):
-            known = thrust * axis[k] + blown[k] - (m * g if k == 2 else 0.0)
+            known = force[k] - (m * g if k == 2 else 0.0)
             memory[o + M.own + k] += dt * (known + memory[o + M.felt + k])
             memory[o + M.felt + k] = w * (m * v[i, k] - memory[o + M.own + k])
             if k == 2:

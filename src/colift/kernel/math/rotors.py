@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from colift.kernel.jit import inline
+from colift.kernel.math import quaternion
 
 
 @inline
@@ -22,6 +23,23 @@ def drag(thrust, axis, coefficient, wind):  # type: ignore[no-untyped-def]
         scale * (wind[0] - along * axis[0]),
         scale * (wind[1] - along * axis[1]),
         scale * (wind[2] - along * axis[2]),
+    )
+
+
+@inline
+def force_of(i, thrust, attitudes, rates, delay, coefficient, wind, velocities):  # type: ignore[no-untyped-def]
+    """Thrust and drag of drone i, world frame, N, along the axis that is there: its attitude is ``delay`` (s) old, and turns."""
+    q, Omega = attitudes[i], rates[i]
+    w, x, y, z = quaternion.turn(
+        q[0], q[1], q[2], q[3], Omega[0] * delay, Omega[1] * delay, Omega[2] * delay
+    )
+    axis = quaternion.third_axis(w, x, y, z)
+    v = velocities[i]
+    blown = drag(thrust, axis, coefficient, (wind[0] - v[0], wind[1] - v[1], wind[2] - v[2]))
+    return (
+        thrust * axis[0] + blown[0],
+        thrust * axis[1] + blown[1],
+        thrust * axis[2] + blown[2],
     )
 
 
