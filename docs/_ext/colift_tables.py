@@ -331,7 +331,7 @@ class FieldTable(SphinxDirective):
             return [
                 table(FIELD_HEAD, field_rows(getattr(schema, self.sections[self.arguments[0]])))
             ]
-        plain = ("name", "description", "seed")
+        plain = ("name", "description", "seed", "derived")
         known = {*plain, *self.sections, "kinds", "list_kinds", *FOLDERS}
         if missing := set(Mission.model_fields) - known:
             raise self.error(f"the mission has sections that this page lacks: {sorted(missing)}")
