@@ -1,4 +1,4 @@
-// Cables: straight and coloured by tension; a slack one sags, dashed; one of unknown tension is grey.
+// Cables: straight and coloured by tension; a slack one sags as far as the ground, dashed; one of unknown tension is grey.
 
 import { Group, Vector3 } from "three";
 import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
@@ -30,6 +30,8 @@ export const cables: Maker = (flight) => {
       loose.material.color.set(now.soft);
     },
     update(frame) {
+      // On the ground a cable lies; just above it, so that it is seen.
+      const lowest = (flight.info.ground ?? -Infinity) + 0.004;
       const straight: number[] = [];
       const colours: number[] = [];
       const sagging: number[] = [];
@@ -51,7 +53,8 @@ export const cables: Maker = (flight) => {
         for (let k = 0; k < PIECES; k += 2) {
           for (const part of [k / PIECES, (k + 1) / PIECES]) {
             point.lerpVectors(from, to, part);
-            sagging.push(point.x, point.y, point.z - 4 * sag * part * (1 - part));
+            const height = point.z - 4 * sag * part * (1 - part);
+            sagging.push(point.x, point.y, Math.max(height, Math.min(point.z, lowest)));
           }
         }
       }
