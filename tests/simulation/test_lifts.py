@@ -18,7 +18,7 @@ ALL = [
 ]  # fmt: skip
 RELEASED = [Phase.RELEASE if phase == Phase.LAND else phase for phase in ALL]
 NOISY = {"timing.delay": 0.02, "sensing.kind": "noisy", "estimation.kind": "predictor"}
-SHORT = {"reference.position": [0.0, 0.0, 0.4], "supervision.fly": 0.5, "timing.duration": 45.0}
+SHORT = {"reference.position": [0.0, 0.0, 0.4], "supervision.fly": 0.5, "timing.duration": 40.0}
 
 
 def fly(name="take-off-and-land", **changes):
@@ -166,7 +166,7 @@ def test_on_the_plant_of_others():
     """Its cables are so stiff that a step decides the peak of a catch; what plants agree on is the impulse."""
     pytest.importorskip("mujoco")
     free = {f"criteria__{name}": {"max": 3.0} for name in ("lift_peak", "touch_peak")}
-    run = fly(plant__kind="mujoco", **SHORT, **free)
+    run = fly(plant__kind="mujoco", **{**SHORT, "timing.duration": 33.0}, **free)
     check(run, peak=3.0, down=3.0)
     assert run.metrics["max_catch_impulse_Ns"] < 0.5 * 0.03  # a drone caught at 3 cm/s
 
