@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import colift
+import terminal
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
@@ -42,13 +43,8 @@ def test_the_example_at_the_top_flies_from_the_command_line(tmp_path: Path) -> N
     assert len(path.read_text().splitlines()) < 40
     charge = [1.0, 0.5, 1.0, 0.8]
     options = ["--set", "allocation.kind=my-allocator", "--set", f"allocation.charge={charge}"]
-    command = [sys.executable, "-m", "colift", "run", "hover", "--with", str(path), *options]
-    done = subprocess.run(
-        [*command, "--set", "timing.duration=5.0", "--out", str(tmp_path), "--json"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    options += ["--set", "timing.duration=5.0", "--out", str(tmp_path), "--json"]
+    done = terminal.colift("run", "hover", "--with", str(path), *options)
     assert done.returncode == 0, done.stderr
     metrics = json.loads(done.stdout)["metrics"]
     assert metrics["tracking_rms_m"] < 0.01
