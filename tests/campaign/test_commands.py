@@ -18,8 +18,10 @@ from colift.study.campaign.store import Store
 from terminal import colift
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "my_allocator.py"
-SHORT = ("--set", "timing.duration=0.3", "--set", "criteria.max_tilt_deg.max=180")
-"""A start out of balance, and the paper's gains, turn a drone over at once."""
+SHORT = (
+    "--workers", "1", "--set", "timing.duration=0.3", "--set", "criteria.max_tilt_deg.max=180",
+)  # fmt: skip
+"""A start out of balance, and the paper's gains, turn a drone over at once; a worker takes longer to start than to fly."""
 
 
 class Images(HTMLParser):

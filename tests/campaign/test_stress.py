@@ -231,7 +231,7 @@ def test_the_command_prints_json_and_is_strict_when_asked(tmp_path: Path) -> Non
     told = json.loads(terminal.colift(*STRESS, *options, check=True).stdout)
     assert (told["passed"], told["flights"]) == (2, 2)
     assert Path(told["files"]["report"]).is_file()
-    hard = [*options, "--strict", "--set", "criteria.min_angle_deg.min=89.0"]
+    hard = [*options, "--workers", "1", "--strict", "--set", "criteria.min_angle_deg.min=89.0"]
     done = terminal.colift(*STRESS, *hard)
     assert done.returncode == 4
     told = json.loads(done.stdout)
@@ -242,7 +242,16 @@ def test_the_command_prints_json_and_is_strict_when_asked(tmp_path: Path) -> Non
 
 
 def test_seeds_begin_where_they_are_told_to(tmp_path: Path) -> None:
-    options = ["--seeds", "2", "--first-seed", "1000", "--set", "timing.duration=0.1"]
+    options = [
+        "--seeds",
+        "2",
+        "--first-seed",
+        "1000",
+        "--workers",
+        "1",
+        "--set",
+        "timing.duration=0.1",
+    ]
     done = terminal.colift(*STRESS, *options, "--out", str(tmp_path), "--json", check=True)
     assert json.loads(done.stdout)["seeds"] == [1000, 1001]
     with Store(tmp_path / "campaign.sqlite") as store:
