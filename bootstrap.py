@@ -2,7 +2,7 @@
 """Set colift up in a virtual environment of its own, then fly, test or run a command.
 
     python3 bootstrap.py run  [ARGUMENT ...]     set up, then: colift run ARGUMENT ...
-    python3 bootstrap.py test [ARGUMENT ...]     set up with the test tools, then: pytest ARGUMENT ...
+    python3 bootstrap.py test [ARGUMENT ...]     set up with the test tools, then: pytest ARGUMENT ..., on all cores
     python3 bootstrap.py check                   set up with all tools: lint, types, docs, benchmark
     python3 bootstrap.py COMMAND [ARGUMENT ...]  set up, then: colift COMMAND ARGUMENT ...
 
@@ -96,7 +96,9 @@ def main() -> None:
     task, rest = arguments[0], arguments[1:]
     set_up("requirements-dev.lock" if task in {"test", "check"} else "requirements.lock")
     if task == "test":
-        execute([str(BIN / "python"), "-m", "pytest", *rest])
+        chosen = any(each.startswith(("-n", "--numprocesses")) for each in rest)
+        workers = [] if chosen else ["-n", "auto", "--dist", "worksteal"]
+        execute([str(BIN / "python"), "-m", "pytest", *workers, *rest])
     elif task == "check":
         with ThreadPoolExecutor() as pool:
             if failed := [found for row in pool.map(check, CHECKS) for found in row]:
