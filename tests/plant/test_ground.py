@@ -72,11 +72,12 @@ def contact_energy(rig):
         masses, x, _ = rig.points()
         beads = slice(1 + rig.n, None)
         total += 0.5 * w**2 * masses[beads] @ np.maximum(0.0, height - x[beads, 2]) ** 2
-    for i, r in enumerate(feet(rig.team)):
-        ux, uy, _ = rotation(rig.drones[i, 6:10])[2]
-        for rise in (ux, -ux, uy, -uy):
-            d = max(0.0, height - rig.drones[i, 2] - r * rise)
-            total += 0.125 * rig.team.masses[i] * w**2 * d**2
+    q0, q1, q2, q3 = rig.drones[
+        :, 6:10
+    ].T  # heights of the feet: r times entries of the rotation's last row
+    rises = feet(rig.team) * 2.0 * np.array([q1 * q3 - q0 * q2, q2 * q3 + q0 * q1])
+    depths = np.maximum(0.0, height - rig.drones[:, 2] - np.concatenate([rises, -rises]))
+    total += 0.125 * w**2 * rig.team.masses @ np.sum(depths**2, axis=0)
     return total
 
 
