@@ -32,9 +32,8 @@ DEEP = 0.1
 """How far below the ground the reference is led at most, m: a load that has not touched by then is unloaded where it is."""
 EAGER = 2.0
 """Speed with which the drones go on as the tensions vanish, over that of touch-down."""
-BRAKE, BRAKING = 5.0, 0.08
-"""Acceleration (m/s^2) of the drones towards the load when it has touched, and for how long, s: the cables' pull, which their motors
-still make up for, throws them up."""
+BRAKING = 0.08
+"""For how long the drones are accelerated towards a load that has touched, s."""
 UNLOADING, VANISH, FADE = 0.6, 0.02, 0.3
 """Time to unload, time in which the tensions vanish, time constant of the drones' speed then, s."""
 TOUCHED = 0.3
@@ -132,8 +131,8 @@ def touch(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
     memory[M.rising] = memory[M.share]
     for i in range(sees.estimated_positions.shape[0]):
         o = M.rows + M.width * i
-        memory[o + M.span + 1] = -params[P.touch]
-        memory[o + M.span + 2] = -BRAKE
+        memory[o + M.span + 1] = -params[P.touch] * (1.0 if params[P.brake] > 0.0 else EAGER)
+        memory[o + M.span + 2] = -params[P.brake]
     for k in range(3):
         memory[M.begin + k] = memory[M.goal + k]
         memory[M.place + k] = sees.estimated_load[0, k]
@@ -141,13 +140,13 @@ def touch(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
 
 
 @inline
-def unload(t, time, params, memory, n):  # type: ignore[no-untyped-def]
+def unload(t, time, dt, params, memory, n):  # type: ignore[no-untyped-def]
     """The tensions vanish, the drones go on towards the load."""
     memory[M.share] = memory[M.rising] * max(1.0 - time / VANISH, 0.0)
     for i in range(n):
         o = M.rows + M.width * i
-        hold_out(i, params, memory)
-        if time < BRAKING and memory[M.again] == 0.0:
+        hold_out(i, dt, params, memory)
+        if time < BRAKING and params[P.brake] > 0.0 and memory[o + M.span + 1] < 0.0:
             steady(o, memory)
         else:
             memory[o + M.want] = -EAGER * params[P.touch] * math.exp(-time / FADE)
@@ -168,7 +167,7 @@ def slacken(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
         if abs(pace) < 0.05 * L:
             make_up(i, 1.0 - decay(dt, 1.0 / params[P.learn]), memory)
         else:
-            hold_out(i, params, memory)
+            hold_out(i, dt, params, memory)
     if not done:
         return
     if memory[M.again] == 0.0:

@@ -76,12 +76,18 @@ def feel(sees, params, memory, dt):  # type: ignore[no-untyped-def]
 
 
 @inline
-def hold_out(i, params, memory):  # type: ignore[no-untyped-def]
-    """Make up for what drone i felt in the mean, and for what the air has changed by since."""
-    o, m = M.rows + M.width * i, params[P.rows + P.width * i + P.m]
+def alone(i, k, params, memory):  # type: ignore[no-untyped-def]
+    """Force on drone i along axis k without its cable's: what it felt in the mean, and by what the air has changed since."""
+    m = params[P.rows + P.width * i + P.m]
+    return memory[M.rows + M.width * i + M.mean + k] + m * (memory[M.air + k] - memory[M.calm + k])
+
+
+@inline
+def hold_out(i, dt, params, memory):  # type: ignore[no-untyped-def]
+    """Make up for the force on drone i without its cable's, not so fast that the noise of it moves the drone."""
+    follow, o = 1.0 - decay(dt, 1.0 / params[P.learn]), M.rows + M.width * i + M.bias
     for k in range(3):
-        memory[o + M.bias + k] = memory[o + M.mean + k]
-        memory[o + M.bias + k] += m * (memory[M.air + k] - memory[M.calm + k])
+        memory[o + k] += follow * (alone(i, k, params, memory) - memory[o + k])
 
 
 @inline
@@ -102,13 +108,13 @@ def make_up(i, rate, memory):  # type: ignore[no-untyped-def]
 
 
 @inline
-def pull(i, sees, memory):  # type: ignore[no-untyped-def]
-    """Length of cable i's span and the tension that is felt: by how much more than is made up for it pulls its drone."""
+def pull(i, sees, params, memory):  # type: ignore[no-untyped-def]
+    """Length of cable i's span and the tension that its drone feels."""
     o = M.rows + M.width * i
     size, along = span_of(i, sees)
     tension = 0.0
     for k in range(3):
-        tension += along[k] * (memory[o + M.felt + k] - memory[o + M.bias + k])
+        tension += along[k] * (memory[o + M.felt + k] - alone(i, k, params, memory))
     return size, tension
 
 

@@ -16,7 +16,7 @@ from colift.control.supervision._lift_memory import (
     go,
     try_again,
 )
-from colift.control.supervision._lift_senses import forget, hold_out, make_up, pull, span_of
+from colift.control.supervision._lift_senses import alone, forget, hold_out, make_up, pull, span_of
 from colift.control.supervision._lift_ways import arc, set_off
 from colift.kernel.jit import inline
 from colift.kernel.math.smooth import decay, rest_to_rest
@@ -28,7 +28,7 @@ NEAR = 0.9
 SOON = 0.94
 """The same from which on the drones go out slowly."""
 AROUND, BOUND = 0.015, 0.03
-"""Share of a cable around its end in which they are slowest, and the most of it, m."""
+"""Share of a cable before its end in which they are slowest, and the most of it, m; beyond its end three tenths of that share."""
 FAR = 1.08
 """The same at which a cable that does not pull is given up."""
 SETTLE, LEARN = 0.8, 2.0
@@ -153,14 +153,14 @@ def hook(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
         L = params[p + P.L]
-        hold_out(i, params, memory)
-        distance, tension = pull(i, sees, memory)
+        hold_out(i, dt, params, memory)
+        distance, tension = pull(i, sees, params, memory)
         if memory[o + M.hooked] == 0.0:
             span = memory[o + M.span]
             near = distance > (SOON - LOOSE) * L
             slowly = span > (SOON - 1.0) * L - 0.15 * params[P.hook]
             memory[o + M.want] = params[P.hook] * (1.0 if slowly else 4.0)
-            if abs(span) < min(AROUND * L, BOUND):
+            if -min(AROUND * L, BOUND) < span < 0.3 * AROUND * L:
                 memory[o + M.want] = params[P.catch]
             pulls = near and tension > max(PULL * share, 3.0 * memory[o + M.spread])
             memory[o + M.sign] = memory[o + M.sign] + dt if pulls else 0.0
@@ -210,7 +210,7 @@ def tension(t, dt, sees, params, memory, home):  # type: ignore[no-untyped-def]
     W = params[P.m_L] * params[P.g]
     load = sees.estimated_load
     for i in range(n):
-        hold_out(i, params, memory)
+        hold_out(i, dt, params, memory)
     if memory[M.stage] == 0.0:
         memory[M.share] += dt / params[P.rise]
         lifted = load[0, 2] - memory[M.place + 2] > LIFTED
@@ -229,7 +229,7 @@ def tension(t, dt, sees, params, memory, home):  # type: ignore[no-untyped-def]
         back = params[P.stiff] * (load[0, 2] - memory[M.top]) + params[P.damp] * load[1, 2]
         memory[M.share] = memory[M.rising] * min(max(1.0 - back / params[P.g], 0.5), 1.5)
         if memory[M.slow] > SWING_IN:
-            weigh(sees, memory)
+            weigh(sees, params, memory)
         if memory[M.slow] >= WEIGH:
             memory[M.stage], memory[M.slow] = 2.0, 0.0
             if abs(memory[M.pull + 2] / (memory[M.share] * W) - 1.0) > AMISS:
@@ -258,15 +258,15 @@ def tension(t, dt, sees, params, memory, home):  # type: ignore[no-untyped-def]
 
 
 @inline
-def weigh(sees, memory):  # type: ignore[no-untyped-def]
+def weigh(sees, params, memory):  # type: ignore[no-untyped-def]
     """Average what all cables bear, and their lengths."""
     n = sees.estimated_positions.shape[0]
     memory[M.count] += 1.0
     for k in range(3):
         borne = 0.0
         for i in range(n):
-            o = M.rows + M.width * i
-            borne += memory[o + M.bias + k] - memory[o + M.felt + k]
+            felt = memory[M.rows + M.width * i + M.felt + k]
+            borne += alone(i, k, params, memory) - felt
         memory[M.pull + k] += (borne - memory[M.pull + k]) / memory[M.count]
     for i in range(n):
         o = M.rows + M.width * i

@@ -52,13 +52,15 @@ from colift.team import Team
 PATIENCE = 10.0
 """Time after which a phase on the ground that does not end is given up, s."""
 CATCH = 5e-4
-"""Speed at which a cable comes taut, over gravity and the mass of load and drone per drone's, s: on a cable as stiff as ``(500 / s)^2`` times
-the mass that is caught, with critical damping, the tension is half of the weight."""
+"""Most speed at which a cable comes taut, over gravity and the mass of load and drone per drone's, s: on a cable as stiff as ``(500 / s)^2``
+times the mass that is caught, with critical damping, the tension is half of the weight."""
 TOLD, THROWN = 0.035, 0.16
 """Time after which a touch-down is told, s, and the speed with which the cables' pull may throw the drones up until they are braked, m/s."""
+BRAKE = 5.0
+"""Acceleration by which they are braked, m/s^2."""
 GENTLE, BRISK, SLOW = 0.08, 0.12, 0.06
 """Least and most speed of a touch-down, m/s, that is as fast as the drones are thrown up, so that no cable catches them; and that where they
-are thrown up faster and will be caught in any case, at this speed."""
+are thrown up faster and will be caught in any case, at this speed, or where there are one or two, which turn widely as they brake."""
 RODS = ("rigid-cables",)
 """Plants whose cables cannot be slack."""
 MOVING = 0.02
@@ -123,7 +125,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     elif now_in == TOUCH:
         touch(t, time, dt, sees, params, memory)
     elif now_in == UNLOAD:
-        unload(t, time, params, memory, n)
+        unload(t, time, dt, params, memory, n)
     elif now_in == SLACKEN:
         slacken(t, time, dt, sees, params, memory)
     elif now_in in (RELEASE, LAND):
@@ -217,7 +219,8 @@ class Lift(SupervisionPart, Delays):
         pull = team.load_mass * team.gravity / float(team.masses.sum())
         ratio = 1.0 + float(team.masses.sum()) / team.load_mass
         thrown = pull * (TOLD + self.lag + self.delay)
-        touch = self.touch_speed or (SLOW if thrown > THROWN else min(max(thrown, GENTLE), BRISK))
+        caught = thrown > THROWN or team.n <= 2
+        touch = self.touch_speed or (SLOW if caught else min(max(thrown, GENTLE), BRISK))
         places = self.set_down if isinstance(self.set_down, list) else [self.set_down or (0.0, 0.0)]
         spots = np.zeros((MOST_ROUNDS, 2))
         spots[: len(places)] = places
@@ -232,7 +235,7 @@ class Lift(SupervisionPart, Delays):
             hook=hook, climb=max(2.0, 5.0 * math.sqrt(L)),
             rise=max(RAISE, SLOWLY / band), stiff=0.1 * band * band * ratio,
             damp=0.5 * band * ratio, margin=0.08 * max(1.0, math.sqrt(L)),
-            clear=0.15 * max(1.0, math.sqrt(L)), patience=PATIENCE,
-            catch=min(0.5 * hook, 0.004 * math.sqrt(L), gentle),
+            clear=0.15 * max(1.0, math.sqrt(L)), patience=PATIENCE, brake=0.0 if caught else BRAKE,
+            catch=min(0.004 * math.sqrt(L) * min(L, 1.0), gentle),
             m=team.masses, L=team.cable_lengths, drag=drag,
         )  # fmt: skip
