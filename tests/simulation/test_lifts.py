@@ -184,11 +184,9 @@ def test_cables_that_stretch(plant):
 
 @pytest.mark.slow
 def test_on_the_plant_of_others():
-    """Its cables are so stiff that a step decides the peak of a catch; what plants agree on is the impulse."""
+    """Its cables are springs with critical damping, whose force is there at once: what counts is the speed of a catch."""
     pytest.importorskip("mujoco")
-    free = {f"criteria__{name}": {"max": 3.0} for name in ("lift_peak", "touch_peak")}
-    run = fly(plant__kind="mujoco", **{**SHORT, "timing.duration": 33.0}, **free)
-    check(run, peak=3.0, down=3.0)
+    run = check(fly(plant__kind="mujoco", **{**SHORT, "timing.duration": 36.0}))
     assert run.metrics["max_catch_impulse_Ns"] < 0.5 * 0.03  # a drone caught at 3 cm/s
 
 
