@@ -42,7 +42,7 @@ def fly(kind: str, **overrides):
 @pytest.mark.parametrize("kind", KINDS)
 def test_answers_are_those_of_the_flight(kind):
     mission, flight = fly(kind)
-    start = start_state(mission)
+    start, _ = start_state(mission)
     every = mission.timing.multiples()["allocation"]
     allocator = Allocator(mission.allocation, mission.team, dt=mission.timing.allocation)
     allocator.reset(directions=start.directions)

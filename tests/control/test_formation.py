@@ -36,6 +36,8 @@ PERIODS = dict.fromkeys(
     ("load_control", "allocation", "position_control", "attitude_control"), 0.01
 )
 
+LATE = {"duration": 12.0, "delay": 0.02, **PERIODS}
+
 
 def fly(n=4, duration=15.0, reference="hover", push=(0.0, 0.0, 0.0), **sections):
     table = {
@@ -96,6 +98,28 @@ def test_a_load_that_starts_off_its_place_swings_no_more_after_two_periods(n):
 def test_one_and_two_drones_fly_a_figure_eight(n):
     flight = fly(n, duration=20.0, reference="figure-eight")
     assert off(flight).max() < 0.02
+
+
+def test_a_drone_with_slow_motors_flies_a_figure_eight():
+    """Its loops are slow; what the load's jerk asks for must not wait for them."""
+    lag = {"max_thrust": 520.0, "mass": 19.4, "arm": 0.7, "motor_lag": 0.08, "count": 1}
+    flight = fly(
+        1,
+        duration=15.0,
+        reference="figure-eight",
+        drones={**lag, "cable_length": 1.8},
+        load={"mass": 10.5},
+        actuation={"kind": "motors"},
+    )
+    assert off(flight).max() < 0.12
+
+
+def test_heavy_drones_hold_a_light_load():
+    """What is misjudged of their thrust is many times the load's weight."""
+    body = {"mass": 18.0, "max_thrust": 360.0, "arm": 0.6, "count": 8, "cable_length": 3.6}
+    flight = fly(8, duration=12.0, drones=body, load={"mass": 1.1}, timing=LATE, allocation={})
+    assert off(flight).max() < 0.02
+    assert float(metrics.compute(flight)["slack_time_s"]) == 0.0
 
 
 @pytest.mark.parametrize(("height", "band"), [(0.3, 9.0), (1.0, 9.0), (10.0, 7.0), (0.5, 3.0)])

@@ -11,8 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colift.control.attitude_control.delay_aware import DelayAware
-from colift.control.tuning import DOUBT, MOST_VELOCITY, RATE_MARGIN, VELOCITY_MARGIN, Delays
+from colift.control.tuning import (
+    DOUBT,
+    MOST_VELOCITY,
+    RATE_MARGIN,
+    SNAP,
+    VELOCITY_MARGIN,
+    Delays,
+    turning,
+)
 from colift.team import Team
+
+TEAM = Team.uniform(4)
 
 settings_of_a_loop = st.fixed_dictionaries(
     {
@@ -33,7 +43,7 @@ def counted(found: Delays) -> float:
 @given(settings_of_a_loop)
 def test_the_rate_loop_has_its_phase_margin(given_settings):
     found = Delays(**given_settings)
-    w = found.bandwidths().rate
+    w = found.bandwidths(TEAM).rate
     # Open loop K_d / (J s) exp(-s tau) at its crossover.
     loop = w / (1j * w) * cmath.exp(-1j * w * counted(found))
     assert abs(loop) == pytest.approx(1.0)
@@ -43,7 +53,7 @@ def test_the_rate_loop_has_its_phase_margin(given_settings):
 @given(settings_of_a_loop)
 def test_the_velocity_loop_has_its_phase_margin_behind_the_attitude(given_settings):
     found = Delays(**given_settings)
-    band = found.bandwidths()
+    band = found.bandwidths(TEAM)
     w = band.velocity
     loop = w / (1j * w) * cmath.exp(-1j * w * (counted(found) + 2.0 / band.rate))
     margin = math.pi + cmath.phase(loop)
@@ -58,11 +68,24 @@ def test_the_velocity_loop_has_its_phase_margin_behind_the_attitude(given_settin
 
 
 def test_more_delay_asks_for_slower_loops():
-    slower = [Delays(delay=delay, predicted=False).bandwidths() for delay in (0.0, 0.01, 0.03)]
+    slower = [Delays(delay=delay, predicted=False).bandwidths(TEAM) for delay in (0.0, 0.01, 0.03)]
     for name in ("rate", "attitude", "velocity", "position"):
         values = [getattr(band, name) for band in slower]
         assert values == sorted(values, reverse=True)
-    assert Delays(delay=0.03).bandwidths().rate > 1.5 * slower[-1].rate
+    assert Delays(delay=0.03).bandwidths(TEAM).rate > 1.5 * slower[-1].rate
+
+
+def test_no_loop_asks_for_more_than_the_rotors_turn():
+    """All torque is asked for at an error of SNAP or more: w^2 theta / 4 of angular acceleration."""
+    quick, slow = (
+        Team.uniform(2, max_thrust=10.0, arm=0.2),
+        Team.uniform(2, max_thrust=10.0, arm=0.01, inertia=(0.02, 0.02, 0.04)),
+    )
+    part = Delays(delay=0.02, period=0.01)
+    assert part.bandwidths(quick) == part.bandwidths(TEAM)
+    rate = part.bandwidths(slow).rate
+    assert rate < part.bandwidths(TEAM).rate
+    assert 0.25 * rate**2 * SNAP == pytest.approx(turning(slow)[0].min())
 
 
 # ---------------------------------------------------------------- the attitude in closed loop

@@ -228,21 +228,25 @@ def test_allocator_time_is_measured():
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 def test_start_is_in_balance(n):
     mission = load_mission("hover", {"drones.count": n, "start.load_offset": [0.1, 0.2, 0.3]})
-    start = start_state(mission)
+    start, thrusts = start_state(mission)
     np.testing.assert_allclose(start.load_position, [0.1, 0.2, 1.3])
     np.testing.assert_allclose(np.linalg.norm(start.directions, axis=1), 1.0)
     w, x, y, z = start.attitudes.T
     axes = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
     T = 0.225 * G / -start.directions[:, 2].sum()
     thrust = 0.5 * G * np.array([0.0, 0.0, 1.0]) - T * start.directions
-    np.testing.assert_allclose(axes, thrust / np.linalg.norm(thrust, axis=1)[:, None], atol=1e-12)
+    size = np.linalg.norm(thrust, axis=1)
+    np.testing.assert_allclose(axes, thrust / size[:, None], atol=1e-12)
+    np.testing.assert_allclose(thrusts, size, rtol=1e-12)
+    # Observers begin with the thrust that acts.
+    np.testing.assert_array_equal(Flight(mission).bus.thrusts, thrusts)
 
 
 def test_start_directions_of_any_length():
     given = [[0.0, 3.0, -4.0], [1.0, 0.0, -1.0], [0.0, 0.0, -1e-3], [-1e5, 0.0, -1e5]]
     mission = load_mission("hover", {"start.directions": given})
     expected = np.array(given) / np.linalg.norm(given, axis=1, keepdims=True)
-    np.testing.assert_allclose(start_state(mission).directions, expected)
+    np.testing.assert_allclose(start_state(mission)[0].directions, expected)
 
 
 def test_without_gravity_and_weightless_cables_nothing_breaks():

@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from colift.kernel.jit import inline
-from colift.part import Declared, Part, Setup
+from colift.part import Declared, Part, Setup, Vector
+from colift.team import Team
 
 RATE_MARGIN = math.radians(60.0)
 """Phase margin of the body-rate loop."""
@@ -23,6 +24,12 @@ DOUBT = 0.25
 
 MOST_VELOCITY = 12.0
 """Most bandwidth of a velocity loop that moves cables, 1/s, however short the delay: they and the allocator have their own time."""
+
+SNAP = 0.08
+"""Error of the attitude from which on all the torque of the rotors is asked for at most, rad: less would be asked for by noise."""
+
+TILTING, YAWING = 1.1, 0.9
+"""Most torque asked for, over what all rotors between hover and their nearer limit give: a little more is clipped by the mixer."""
 
 LEAN = 0.5
 """Most that the wanted cable directions answer to a load error: metres that the drones move for a metre."""
@@ -65,19 +72,27 @@ class Delays(Part):
             found["lag"] = mission.actuation.motor_lag()
         return found | super().declared(mission)
 
-    def bandwidths(self) -> Bandwidths:
+    def uncertain(self) -> float:
+        """Time between a motion and the answer to it that nothing makes up for, s."""
+        share = DOUBT if self.predicted else 1.0
+        return share * (self.delay + self.lag) + 0.5 * self.period
+
+    def bandwidths(self, team: Team) -> Bandwidths:
         """The rule.
 
         ``J dOmega/dt = -K_d Omega(t - tau)`` crosses over at ``w = K_d / J`` with the phase margin
         ``pi/2 - w tau``; ``tau`` is the delay, half a period of the hold, and the motors' lag. What
         is predicted counts by a quarter. The angle's loop around it is critically damped at a quarter
-        of ``w`` (so ``rho = w / 2``, for the manifold's ``q_e`` is half an angle). The velocity loop
+        of ``w`` (so ``rho = w / 2``, for the manifold's ``q_e`` is half an angle). An error ``theta`` asks for
+        ``w^2 theta / 4``, which no drone of the team may be unable to give already for a small one. The velocity loop
         sees ``tau`` and the lag ``1 / w`` of an attitude whose wanted rate is fed forward, and is bounded; position again
         a quarter.
         """
-        share = DOUBT if self.predicted else 1.0
-        tau = share * (self.delay + self.lag) + 0.5 * self.period
+        tau = self.uncertain()
         rate = (0.5 * math.pi - RATE_MARGIN) / tau
+        least = float(np.min(np.nan_to_num(turning(team)[0], nan=math.inf)))
+        if math.isfinite(least):
+            rate = min(rate, math.sqrt(4.0 * least / SNAP))
         velocity = min((0.5 * math.pi - VELOCITY_MARGIN) / (tau + 2.0 / rate), MOST_VELOCITY)
         return Bandwidths(rate, 0.25 * rate, velocity, 0.25 * velocity)
 
@@ -88,6 +103,19 @@ class Delays(Part):
             yield from shorter("delay", self.delay, f"sensing.{sensor}_delay", delays[sensor])
         yield from lag_warnings(self.lag, mission)
         yield from shorter("period", self.period, f"timing.{layer}", getattr(mission.timing, layer))
+
+
+def turning(team: Team) -> tuple[Vector, Vector]:
+    """Angular accelerations (n,) that the rotors can give beside hover, in roll and pitch, and in yaw, rad/s^2.
+
+    NaN where thrust, arm or torque ratio are not known.
+    """
+    hover = (team.masses + team.load_mass / team.n) * team.gravity
+    spare = np.maximum(np.minimum(hover, team.max_thrusts - hover), 0.05 * hover)
+    spare = np.where(np.isfinite(team.max_thrusts), spare, math.nan)
+    lever = np.where(team.rotors > 4, 0.5, math.sqrt(0.5)) * team.arms
+    tilting = TILTING * lever * spare / team.inertias[:, :2].max(axis=1)
+    return tilting, YAWING * team.torque_ratios * spare / team.inertias[:, 2]
 
 
 def shorter(field: str, told: float, other: str, real: float) -> Iterable[tuple[str, str]]:

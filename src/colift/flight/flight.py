@@ -76,7 +76,7 @@ class Flight:
         self._due = sorted(timetable(mission), key=lambda item: item[0])
         self._legs: list[Leg] = []
         drones = mission.first_drones()
-        start = start_state(mission)
+        start, thrusts = start_state(mission)
         self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
         bus = self.bus
         self.wires.reference.writes.reference[:] = bus.reference[:] = mission.reference.sample(
@@ -84,6 +84,7 @@ class Flight:
         )[0]
         bus.desired_directions[:] = start.directions
         bus.received_directions[:] = start.directions
+        bus.thrusts[:] = thrusts
 
     @property
     def time(self) -> float:
@@ -281,6 +282,7 @@ class Flight:
             else:
                 now[:] = before
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
+        bus.thrusts[new] = team.masses[new] * team.gravity
         self.wires.reference.writes.reference[:] = old.circuit.wires.reference.writes.reference
 
     def recording(self, since: float = 0.0) -> Recording:
@@ -549,8 +551,8 @@ def _refill(vector: Vector, packed: Vector, path: str) -> None:
     vector[:] = packed
 
 
-def start_state(mission: Mission) -> Start:
-    """Of the drones that fly at first: at rest on the start formation, each drone's thrust holding its share of the load.
+def start_state(mission: Mission) -> tuple[Start, Vector]:
+    """Of the drones that fly at first: at rest on the start formation, each drone's thrust (n,), N, holding its share of the load.
 
     The attitude is the zero-yaw one for the static thrust, so that the flight starts in balance; level where cables may be slack.
     """
@@ -568,12 +570,15 @@ def start_state(mission: Mission) -> Start:
     if mission.start.on_ground and mission.ground is not None:
         load[2] = mission.ground.height
     places = mission.start_places(load)
+    thrusts = norms[:, 0]
     if places is not None:
         aim = np.tile(upward, (team.n, 1))
-    return Start(
+        thrusts = np.zeros(team.n) if mission.start.on_ground else team.masses * team.gravity
+    start = Start(
         load_position=load,
         load_velocity=np.zeros(3),
         directions=directions,
         attitudes=zero_yaw_quaternion(aim),
         places=places,
     )
+    return start, thrusts

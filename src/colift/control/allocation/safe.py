@@ -228,7 +228,7 @@ MOST = 1.0 - RESERVE
 """Share of a drone's thrust that is planned with then."""
 MU = 8.0
 """Weight of the alignment penalty over W^2 / n^3, for a load of weight W on n cables: a cone in which they stand wide apart."""
-RATE, SWINGING = 0.15, 1.0
+RATE, SWINGING = 0.4, 1.0
 """Fastest turn of cables of 1 m, rad/s, which drones with real motors can follow; of one or two cables, on which a load swings."""
 ANY = 1e6
 """Force that nothing limits, N."""
@@ -292,7 +292,7 @@ class Safe(AllocatorPart):
     max_cone_deg: Degrees = 75.0
     """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
     max_rate: Annotated[float, Field(gt=0.0, le=1e3)] | None = None
-    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 0.15 for a cable of 1 m and less as
+    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 0.4 for a cable of 1 m and less as
     the square root of its length, 1 for teams of one or two; else 6."""
     max_thrust: Force | list[Force] | None = None
     """Largest thrust of a drone, N. None: 0.95 of ``drones.max_thrust``, or not limited."""

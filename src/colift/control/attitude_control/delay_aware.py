@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.attitude_control.base import SIGNATURE, AttitudeControlPart
-from colift.control.tuning import Delays
+from colift.control.tuning import Delays, turning
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
@@ -22,9 +22,6 @@ from colift.team import Team
 
 YAW = 0.25
 """Bandwidth of yaw over that of roll and pitch: nothing hangs on it, and its torque is small."""
-
-TILTING, YAWING = 1.1, 0.9
-"""Most torque asked for, over what all rotors between hover and their nearer limit give: a little more is clipped by the mixer."""
 
 Acceleration = Annotated[float, Field(gt=0.0, le=1e5)]
 
@@ -160,18 +157,11 @@ class DelayAware(AttitudeControlPart, Delays):
     """Silence that is only the sensor's sampling, which the estimator makes up for, s."""
 
     def left_open(self, team: Team) -> dict[str, Vector]:
-        hover = (team.masses + team.load_mass / team.n) * team.gravity
-        spare = np.maximum(np.minimum(hover, team.max_thrusts - hover), 0.05 * hover)
-        spare = np.where(np.isfinite(team.max_thrusts), spare, math.nan)
-        lever = np.where(team.rotors > 4, 0.5, math.sqrt(0.5)) * team.arms
-        tilting = TILTING * lever * spare / team.inertias[:, :2].max(axis=1)
-        return {
-            "max_acceleration": tilting,
-            "max_yaw_acceleration": YAWING * team.torque_ratios * spare / team.inertias[:, 2],
-        }
+        tilting, yawing = turning(team)
+        return {"max_acceleration": tilting, "max_yaw_acceleration": yawing}
 
     def gains(self, team: Team) -> tuple[Vector, Vector, Vector]:
-        rate = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
+        rate = self.bandwidths(team).rate * np.array([1.0, 1.0, YAW])
         return rate * team.inertias, np.zeros((team.n, 3)), np.tile(0.5 * rate, (team.n, 1))
 
     def made_up_for(self) -> tuple[float, float]:
@@ -183,7 +173,7 @@ class DelayAware(AttitudeControlPart, Delays):
 
     def params(self, team: Team) -> Vector:
         span, lag, coast = (self.delay, self.lag, self.coast) if self.predicted else (0.0, 0.0, 0.0)
-        gains = self.bandwidths().rate * np.array([1.0, 1.0, YAW])
+        gains = self.bandwidths(team).rate * np.array([1.0, 1.0, YAW])
         turning = self.settled("max_acceleration", team)
         most = np.column_stack([turning, turning, self.settled("max_yaw_acceleration", team)])
         return PARAMS.pack(

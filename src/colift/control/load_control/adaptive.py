@@ -94,7 +94,7 @@ class Adaptive(LoadControlPart, Delays):
         yield from self.delay_warnings(mission, "load_control")
 
     def params(self, team: Team) -> Vector:
-        band = self.bandwidths()
+        band = self.bandwidths(team)
         k_p = LEAN * team.load_mass * team.gravity / float(team.cable_lengths.mean())
         stiffness = float(team.masses.sum()) * band.velocity * band.position + k_p
         slope = band.position

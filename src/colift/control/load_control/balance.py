@@ -21,6 +21,9 @@ MEMORY = Layout(team={"push": 3})
 """Filtered external force on the load, N."""
 P, M = PARAMS.at, MEMORY.at
 
+MISJUDGED = 0.05
+"""Share of the force that moves the drones which may be taken for one on the load."""
+
 
 @kernel(SIGNATURE)
 def _balance(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
@@ -47,7 +50,8 @@ class Balance(LoadControlPart, Delays):
     """Feed-forward of the load's motion and of the observed force on it; no feedback of its place.
 
     The drones hold the formation (position control of kind ``formation``), and the load hangs on it. The force comes
-    from the layer of observation and holds a wrong mass of the load, too.
+    from the layer of observation and holds a wrong mass of the load, too. Below heavy drones it is followed slowly: what is
+    not known of their thrust is taken for a push on the load.
     """
 
     kernel = _balance
@@ -64,10 +68,14 @@ class Balance(LoadControlPart, Delays):
         yield from self.delay_warnings(mission, "load_control")
 
     def params(self, team: Team) -> Vector:
-        rate = self.rate * self.bandwidths().velocity
+        rate = self.rate * self.bandwidths(team).velocity
+        g, L = max(team.gravity, 1e-3), float(team.cable_lengths.mean())
         if team.n <= 2:
-            wp = math.sqrt(max(team.gravity, 1e-3) / float(team.cable_lengths.mean()))
-            rate = min(rate, self.swing * wp)
+            rate = min(rate, self.swing * math.sqrt(g / L))
+        # A motion x of the drones at the rate r asks for M r^2 x. What is misjudged of it looks like a force on the load, and leans
+        # the cables: their drones move by L / (m g) of it, by no more than x.
+        heavy = MISJUDGED * float(team.masses.sum()) * L
+        rate = min(rate, math.sqrt(team.load_mass * g / heavy))
         return PARAMS.pack(
             team.n, m=team.load_mass, g=team.gravity, rate=rate,
             tangent=math.tan(math.radians(self.max_lean_deg)),

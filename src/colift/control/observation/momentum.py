@@ -193,10 +193,11 @@ class Momentum(ObservationPart, Delays):
     per_drone = ("rotor_drag",)
     from_team: ClassVar[Mapping[str, float | None]] = {"rotor_drag": 0.0}
 
-    total: Annotated[float, Field(gt=0.0, le=5.0)] = 0.765
+    total: Annotated[float, Field(gt=0.0, le=5.0)] = 0.85
     """Bandwidth of the observer of the whole momentum over that of the velocity loop."""
-    own: Annotated[float, Field(gt=0.0, le=5.0)] = 0.46
-    """Bandwidth of that of each drone, likewise."""
+    own: Annotated[float, Field(gt=0.0, le=5.0)] = 0.85
+    """Bandwidth of that of each drone, likewise. As fast as that of the whole: what one knows before the other is taken for a
+    force on the load."""
     rotor_drag: Drag | list[Drag] | None = None
     """Force in the rotors' plane per thrust and speed across it, s/m. None: ``drones.rotor_drag``, or none."""
     breeze: Annotated[float, Field(gt=0.0, le=5.0)] = 0.15
@@ -213,7 +214,7 @@ class Momentum(ObservationPart, Delays):
         yield from self.delay_warnings(mission, "position_control")
 
     def params(self, team: Team) -> Vector:
-        velocity = self.bandwidths().velocity
+        velocity = self.bandwidths(team).velocity
         return PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, total=self.total * velocity,
             own=self.own * velocity, drag=self.settled("rotor_drag", team),

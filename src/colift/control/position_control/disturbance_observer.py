@@ -191,7 +191,7 @@ class DisturbanceObserver(PositionControlPart, Delays):
         yield from self.delay_warnings(mission, "position_control")
 
     def params(self, team: Team) -> Vector:
-        band = self.bandwidths()
+        band = self.bandwidths(team)
         return PARAMS.pack(
             team.n, g=team.gravity, velocity=band.velocity, position=band.position,
             observer=self.observer * band.position, observer_limit=self.observer_limit,

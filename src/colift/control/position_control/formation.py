@@ -45,6 +45,8 @@ FULL = 0.95
 """Share of a drone's largest thrust that it is asked for."""
 CALM = 0.6
 """Share of the bandwidth and of ``max_push`` that is left while the load stands: when the tensions go, no attitude follows faster."""
+SMOOTH = 2.0
+"""Time constant of the filter of the reference's fourth derivative, in periods."""
 IDLE = 0.1
 """Thrust of a drone that stands on the ground, over its weight."""
 UNKNOWN = 2.5
@@ -76,6 +78,8 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     n = x.shape[0]
     g, m_L, omega = params[P.g], params[P.m_L], params[P.frequency]
     keep = decay(dt, params[P.thrust_filter])
+    # A reference of corners steps in its jerk.
+    keep_snap = decay(dt, SMOOTH * dt)
     # By how much what the cables are told to do for the load falls short: the drones do it together.
     short_x = forces[n, 0] - m_L * reference[2, 0]
     short_y = forces[n, 1] - m_L * reference[2, 1]
@@ -88,7 +92,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         height += (x[i, 2] - ends[i, 0, 2]) / n
         swinging = n <= 2 and not stands and math.isnan(nominal[i, 0, 0])
         if swinging:
-            _ask_for(i, m_L / n, wanted, dt, keep, memory, o)
+            _ask_for(i, m_L / n, wanted, dt, keep_snap, memory, o)
         change = memory[o + M.change : o + M.change + 9]
         if memory[o + M.started] == 0.0:
             for k in range(3):
@@ -208,7 +212,7 @@ class Formation(PositionControlPart, Delays):
         yield from self.delay_warnings(mission, "position_control")
 
     def params(self, team: Team) -> Vector:
-        band = self.bandwidths().velocity
+        band = self.bandwidths(team).velocity
         k = self.gain * band
         return PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,

@@ -214,7 +214,7 @@ class Lift(SupervisionPart, Delays):
             yield "kind", message
 
     def params(self, team: Team) -> Vector:
-        band = self.bandwidths().velocity
+        band = self.bandwidths(team).velocity
         L = float(team.cable_lengths.mean())
         pull = team.load_mass * team.gravity / float(team.masses.sum())
         ratio = 1.0 + float(team.masses.sum()) / team.load_mass
