@@ -47,7 +47,8 @@ MEMORY = Layout(
     team={"S": newton.SYSTEM, "lam": 3, "M": 6, "facing": 3, "yielded": 1, "asked": 3},
     drone={
         "data": newton.DATA, "T": 1, "alpha": 3, "start": 3, "w": 3, "dw": 3, "w_new": 3,
-        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1, "length": 1, "size": 1,
+        "row": newton.ROW, "Y": 2 * newton.PITCH, "order": 1, "first": 1, "last": 1, "begin": 1,
+        "length": 1, "size": 1,
     },
 )  # fmt: skip
 """In columns; those of every limit, of every pair, and the matrix ``K`` follow. A team that changes starts anew."""
@@ -88,6 +89,8 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         root=column(memory, near, most, PAIRS.root),
         flat=params[P.flat],
         first=column(memory, C.rows, n, CABLES.first),
+        last=column(memory, C.rows, n, CABLES.last),
+        begin=column(memory, C.rows, n, CABLES.begin),
         rows=column(memory, C.rows, n, CABLES.row),
         K=memory[square : square + 4 * n * n],
         Y=column(memory, C.rows, n, CABLES.Y),
@@ -160,6 +163,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
             n, m, params[P.reach], delta, params[P.kappa_pair], recovery.SURE, recovery.ROOM, recovery.FIRM,
             start, apart, work,
         )  # fmt: skip
+    newton.lay_out(n, work)
     heavy = max(1.0, abs(fz) / n)
     leaning = 0.0
     if yielded[0] > 0.0:
