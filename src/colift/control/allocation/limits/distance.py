@@ -134,6 +134,7 @@ def near_ellipsoids(n, m, reach, delta, kappa, sure, slack, firm, start, apart, 
             g = room(i, j, apart, x, y, z, u, v, w)
             if g < edge:
                 first[i] = min(first[i], j)
+                work.strong[i] = min(work.strong[i], j)
                 pairs[2 * m] = i
                 pairs[2 * m + 1] = j
                 fade = min(1.0 - g / edge, 1.0)

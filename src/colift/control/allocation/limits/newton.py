@@ -75,6 +75,8 @@ PITCH = 12
 
 DENSE = 8
 """Teams of up to so many cables have their matrix as a square; larger ones by columns, as long as the envelope is."""
+STRONG = 0.004
+"""Stiffness of a pair over that of the proximal term from which on it is strong."""
 
 SYSTEM = 8 * 8 + 8
 
@@ -106,7 +108,8 @@ class Work(NamedTuple):
     flat: float
     """Of ellipsoids, ``1 / stretch^2``."""
     first: Any
-    """First near neighbour of every cable."""
+    strong: Any
+    """First near neighbour of every cable, and first of those whose pair is stiff, see :func:`is_strong`."""
     last: Any
     begin: Any
     """Last cable in the columns of every cable, and where in ``K`` they begin, see :func:`lay_out`."""
@@ -115,7 +118,8 @@ class Work(NamedTuple):
     K: Any
     Y: Any
     S: Any
-    """The matrix and its factor, ``L^-1 [U^T, q]``, the reduced system."""
+    eta: Any
+    """The matrix and its factor, ``L^-1 [U^T, q]``, the reduced system, and what it leaves for every cable (2n)."""
     lam: Any
     M: Any
     """Multiplier of the force balance (3), ``sum alpha alpha^T`` (6)."""
@@ -132,19 +136,27 @@ class Weights(NamedTuple):
 
 
 @inline
-def lay_out(n, work):  # type: ignore[no-untyped-def]
-    """Where the columns of every cable stand in ``K``, from ``first``; none where the matrix is a square.
+def is_strong(c, g, kappa, rho):  # type: ignore[no-untyped-def]
+    """Whether a pair with the cosine c and the margin g couples its cables noticeably beside the proximal term."""
+    return kappa * (1.0 - c * c + g) > STRONG * rho * g * g
+
+
+@inline
+def lay_out(n, whole, work):  # type: ignore[no-untyped-def]
+    """Where the columns of every cable stand in ``K``; none where the matrix is a square.
 
     Cable j has two columns, one behind the other. Each has the rows of the cables j to ``last[j]``, two for each, and two more
-    that are zero. All that the factor fills is within these: ``last`` never falls from cable to cable.
+    that are zero. All that the factor fills is within these: ``last`` never falls from cable to cable. Not ``whole`` leaves out
+    pairs that are not strong and beyond all that are: steps take them for fixed, gradients do not.
     """
     if n <= DENSE:
         return
-    first, last, begin = work.first, work.last, work.begin
+    last, begin = work.last, work.begin
     for j in range(n):
         last[j] = j
     for i in range(n):
-        last[int(first[i])] = i
+        j = int(work.first[i] if whole else work.strong[i])
+        last[j] = i
     at = 0
     reached = 0
     for j in range(n):
@@ -291,6 +303,8 @@ def assemble(n, limits, caps, m, weights, work):  # type: ignore[no-untyped-def]
         rows[oj + 10] += stiff * uj1 * uj1 - zk * c
         rows[oj + 11] += stiff * uj1 * uj2
         rows[oj + 12] += stiff * uj2 * uj2 - zk * c
+        if n > DENSE and i > work.last[j]:
+            continue
         scale = 1.0 / (T[i] * T[j])
         top, down, right = block_of(n, i, j, work)
         low = top + down
@@ -642,6 +656,7 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
             Y[k1 + k] = (Y[k1 + k] - l10 * Y[k0 + k]) * i1
     return True
 
+
 @inline
 def factor_columns(n, shift, work):  # type: ignore[no-untyped-def]
     """Column by column, each cable's two less all that reach so far: the long loops are along columns and right sides."""
@@ -825,7 +840,7 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
 
     From the gradient in ``w_new``, in the frames of the matrix, and ``(rx, ry, rz) = sum w + F``.
     """
-    first, G = work.first, work.w_new
+    first, G, eta = work.first, work.w_new, work.eta
     rows, K, Y, S = work.rows, work.K, work.Y, work.S
     for k in range(5):
         S[64 + k] = 0.0
@@ -846,18 +861,17 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
         S[69] -= part * x
         S[70] -= part * y
         S[71] -= part * z
-        k0 = PITCH * 2 * i + 8
-        Y[k0] = q1 - rows[o + 15] * part
-        Y[k0 + PITCH] = q2 - rows[o + 16] * part
+        eta[2 * i] = q1 - rows[o + 15] * part
+        eta[2 * i + 1] = q2 - rows[o + 16] * part
     for i in range(n):
         k0 = PITCH * 2 * i
         k1 = k0 + PITCH
+        y0, y1 = eta[2 * i], eta[2 * i + 1]
         if n <= DENSE:
-            y0, y1 = Y[k0 + 8], Y[k1 + 8]
             top = 4 * n * i
             low = top + 2 * n
             for j in range(int(first[i]), i):
-                v0, v1 = Y[PITCH * 2 * j + 8], Y[PITCH * (2 * j + 1) + 8]
+                v0, v1 = eta[2 * j], eta[2 * j + 1]
                 y0 -= K[top + 2 * j] * v0 + K[top + 2 * j + 1] * v1
                 y1 -= K[low + 2 * j] * v0 + K[low + 2 * j + 1] * v1
             y0 *= K[top + 2 * i]
@@ -865,10 +879,11 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
         else:
             c = int(work.begin[i])
             s = c + height(i, work.last)
-            y0 = Y[k0 + 8] * K[c]
-            y1 = (Y[k1 + 8] - K[c + 1] * y0) * K[s + 1]
+            y0 *= K[c]
+            y1 = (y1 - K[c + 1] * y0) * K[s + 1]
             for r in range(2, 2 * (int(work.last[i]) - i + 1)):
-                Y[k0 + PITCH * r + 8] -= K[c + r] * y0 + K[s + r] * y1
+                eta[2 * i + r] -= K[c + r] * y0 + K[s + r] * y1
+        eta[2 * i], eta[2 * i + 1] = y0, y1
         Y[k0 + 8] = y0
         Y[k1 + 8] = y1
         for k in range(8):
@@ -878,40 +893,38 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
 @inline
 def back_substitute(n, work):  # type: ignore[no-untyped-def]
     """``dw`` of every cable from the solution in ``S[64:]``; the largest component of the Lagrangian's gradient before it."""
-    first, dw = work.first, work.dw
+    first, dw, eta = work.first, work.dw, work.eta
     rows, K, Y, S = work.rows, work.K, work.Y, work.S
     for r in range(2 * n):
         o = PITCH * r
         value = Y[o + 8]
         for k in range(8):
             value += Y[o + k] * S[64 + k]
-        Y[o + 8] = -value
+        eta[r] = -value
     lx, ly, lz = S[69], S[70], S[71]
     worst = 0.0
     for i in range(n - 1, -1, -1):
-        k0 = PITCH * 2 * i + 8
-        k1 = k0 + PITCH
+        eta1, eta2 = eta[2 * i], eta[2 * i + 1]
         if n <= DENSE:
             top = 4 * n * i
             low = top + 2 * n
-            eta2 = Y[k1] * K[low + 2 * i + 1]
-            eta1 = (Y[k0] - K[low + 2 * i] * eta2) * K[top + 2 * i]
-            for j in range(int(first[i]), i):
-                Y[PITCH * 2 * j + 8] -= K[top + 2 * j] * eta1 + K[low + 2 * j] * eta2
-                Y[PITCH * (2 * j + 1) + 8] -= K[top + 2 * j + 1] * eta1 + K[low + 2 * j + 1] * eta2
+            eta2 *= K[low + 2 * i + 1]
+            eta1 = (eta1 - K[low + 2 * i] * eta2) * K[top + 2 * i]
+            for k in range(2 * int(first[i]), 2 * i):
+                eta[k] -= K[top + k] * eta1 + K[low + k] * eta2
         else:
             c = int(work.begin[i])
             s = c + height(i, work.last)
-            eta1, eta2, a, b = Y[k0], Y[k1], 0.0, 0.0
+            a, b = 0.0, 0.0
             for r in range(2, 2 * (int(work.last[i]) - i + 1), 2):
-                u, v = Y[k0 + PITCH * r], Y[k1 + PITCH * r]
+                u, v = eta[2 * i + r], eta[2 * i + r + 1]
                 eta1 -= K[c + r] * u
                 eta2 -= K[s + r] * u
                 a += K[c + r + 1] * v
                 b += K[s + r + 1] * v
             eta2 = (eta2 - b) * K[s + 1]
             eta1 = (eta1 - a - K[c + 1] * eta2) * K[c]
-            Y[k0], Y[k1] = eta1, eta2
+            eta[2 * i], eta[2 * i + 1] = eta1, eta2
         o = ROW * i
         x, y, z = rows[o + 6], rows[o + 7], rows[o + 8]
         rt = rows[o + 18] + lx * x + ly * y + lz * z
