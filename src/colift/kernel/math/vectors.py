@@ -53,8 +53,11 @@ def _code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 
 
 @intrinsic
-def _eliminate_quad(typingctx, vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
+def _intrinsic(typingctx, vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
     return types.void(vector, first, second, one, two, a, b, c, d), _code
+
+
+_eliminate_quad: Any = _intrinsic
 
 
 @overload(eliminate_quad, inline="always")
