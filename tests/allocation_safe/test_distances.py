@@ -176,12 +176,13 @@ def test_gradient_and_hessian_of_the_ellipsoids_are_those_of_finite_differences(
             data=one, T=np.ones(n), alpha=alpha.ravel(), w=one, dw=one, w_new=one, g=g, g_new=one,
             z=np.array([kappa / g[0]]), pairs=np.array([1.0, 0.0]), kappa_pair=np.array([kappa]),
             cos_max=np.array([1e-3]), cause=one, root=np.array([root]), flat=flat, first=one,
+            strong=one, last=one, begin=one, eta=one,
             rows=rows, K=K, Y=one, S=one, lam=one, M=one,
         )  # fmt: skip
         again, ambient = np.zeros(1), np.zeros(3 * n)
         distance.margins(n, 0, 1, 0, work, again)
         assert again[0] == pytest.approx(g[0], rel=1e-12)
-        distance.assemble(n, 0, 1, 0, newton.ROW, work)
+        distance.assemble(n, 0, 1, 0, newton.ROW, newton.block_of, work)
         distance.add_gradient(0, 1, 0, work, ambient)
 
         def barrier(x, alpha=alpha, basis=basis, value=value, kappa=kappa):

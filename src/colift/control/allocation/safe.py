@@ -47,7 +47,8 @@ MEMORY = Layout(
     team={"S": newton.SYSTEM, "lam": 3, "M": 6, "facing": 3, "yielded": 1, "asked": 3},
     drone={
         "data": newton.DATA, "T": 1, "alpha": 3, "start": 3, "w": 3, "dw": 3, "w_new": 3,
-        "row": newton.ROW, "Y": 2 * newton.RHS, "order": 1, "first": 1, "length": 1, "size": 1,
+        "row": newton.ROW, "Y": 2 * newton.PITCH, "order": 1, "first": 1, "strong": 1, "last": 1, "begin": 1,
+        "eta": 2, "length": 1, "size": 1,
     },
 )  # fmt: skip
 """In columns; those of every limit, of every pair, and the matrix ``K`` follow. A team that changes starts anew."""
@@ -88,10 +89,14 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         root=column(memory, near, most, PAIRS.root),
         flat=params[P.flat],
         first=column(memory, C.rows, n, CABLES.first),
+        strong=column(memory, C.rows, n, CABLES.strong),
+        last=column(memory, C.rows, n, CABLES.last),
+        begin=column(memory, C.rows, n, CABLES.begin),
         rows=column(memory, C.rows, n, CABLES.row),
         K=memory[square : square + 4 * n * n],
         Y=column(memory, C.rows, n, CABLES.Y),
         S=column(memory, 0, 1, CABLES.S),
+        eta=column(memory, C.rows, n, CABLES.eta),
         lam=column(memory, 0, 1, CABLES.lam),
         M=column(memory, 0, 1, CABLES.M),
     )
@@ -153,7 +158,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     if 2.0 * delta > params[P.reach]:
         edge = math.cos(min(params[P.min_angle] + 2.0 * delta, math.pi))
     m = caps = cycle.near_pairs(
-        n, params[P.cos_angle], edge, params[P.kappa_pair], start, apart, work
+        n, params[P.cos_angle], edge, params[P.kappa_pair], rho, start, apart, work
     )
     if apart.stacked:
         m = distance.near_ellipsoids(
@@ -310,8 +315,9 @@ class Safe(AllocatorPart):
     """Barrier of all other limits, in squared shares of the load. Approach very small ones in steps."""
     tolerance: Annotated[float, Field(ge=1e-10, le=1e-3)] = 1e-6
     """KKT residual, in shares of the load, at which the iteration stops."""
-    max_iterations: Annotated[int, Field(ge=2, le=200)] = 36
-    """Most interior-point steps in one call."""
+    max_iterations: Annotated[int, Field(ge=2, le=200)] = 20
+    """Most interior-point steps in one call, one whose matrix has to be built again counted half as well. The next call goes
+    on from there; limits hold after every step."""
 
     @model_validator(mode="after")
     def _ranges(self) -> Safe:

@@ -20,7 +20,7 @@ PARAMS = Layout(team={"rho": 3, "K_d": 3, "beta": 3, "gamma": 3})
 P = PARAMS.at
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _manifold(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     q, Omega, q_d = sees.estimated_attitudes, sees.estimated_rates, sees.desired_attitudes
     Omega_d = sees.desired_rates

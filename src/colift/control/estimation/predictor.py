@@ -143,7 +143,7 @@ def _attitude(o, i, age, dt, attitudes, rates, params, memory):  # type: ignore[
     return age - min(memory[o + B.since], params[P.steady])
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, dt = now.step, now.dt
     load, positions = sees.measured_load, sees.measured_positions

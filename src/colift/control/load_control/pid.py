@@ -23,7 +23,7 @@ MEMORY = Layout(team={"integral": 3})
 P, M = PARAMS.at, MEMORY.at
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     load, reference = sees.estimated_load, sees.reference

@@ -28,7 +28,7 @@ MEMORY = Layout(drone={"started": 1, "integral": 3, "alpha": 3, "alpha_rate": 3,
 P, M = PARAMS.at, MEMORY.at
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     x, v, ends = sees.estimated_positions, sees.estimated_velocities, sees.wanted_ends

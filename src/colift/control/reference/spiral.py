@@ -15,7 +15,7 @@ from colift.part import Vector
 from colift.team import Team
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _spiral(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     t = now.time
     reference = writes.reference

@@ -6,7 +6,7 @@ from colift.kernel.jit import kernel
 from colift.world.actuation.base import SIGNATURE, ActuationPart
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _act(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     thrusts, torques, motor_health = sees.thrusts, sees.torques, sees.motor_health
     applied_thrusts, applied_torques = writes.applied_thrusts, writes.applied_torques

@@ -90,7 +90,7 @@ def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[n
     return fits
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, key, dt = now.step, now.key, now.dt
     thrusts, torques, motor_health = sees.thrusts, sees.torques, sees.motor_health

@@ -125,7 +125,7 @@ def catch_impulse(i, parting, params):  # type: ignore[no-untyped-def]
     return parting * m * m_L / (m + m_L)
 
 
-@kernel(OBSERVE_SIGNATURE)
+@kernel(OBSERVE_SIGNATURE, counted=False)
 def observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     load, ends = writes.load, writes.ends
     positions, velocities = writes.positions, writes.velocities

@@ -30,7 +30,7 @@ SCRATCH = Layout(drone={"T": 1, "b": 1, "alpha": 3})
 SPANS = SCRATCH.spans
 
 
-@kernel(STEP_SIGNATURE)
+@kernel(STEP_SIGNATURE, counted=False)
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces

@@ -153,7 +153,7 @@ def catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_
             taut[i] = 0.0
 
 
-@kernel(STEP_SIGNATURE)
+@kernel(STEP_SIGNATURE, counted=False)
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces

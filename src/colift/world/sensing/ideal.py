@@ -6,7 +6,7 @@ from colift.kernel.jit import kernel
 from colift.world.sensing.base import SIGNATURE, SensingPart
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     load, positions, velocities = sees.load, sees.positions, sees.velocities
     attitudes, rates, stuck = sees.attitudes, sees.rates, sees.stuck

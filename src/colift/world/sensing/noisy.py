@@ -107,7 +107,7 @@ def _draw_biases(memory, o, width, key, channel, params, quantity):  # type: ign
     _disturb(memory, o, width, key, -1, channel, params, quantity + Q.spread)
 
 
-@kernel(SIGNATURE)
+@kernel(SIGNATURE, counted=False)
 def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, key, dt = now.step, now.key, now.dt
     load, positions, velocities = sees.load, sees.positions, sees.velocities

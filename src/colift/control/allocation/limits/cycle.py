@@ -81,6 +81,8 @@ SLIGHT = 1e-3
 """Largest part of the cost that is left then."""
 DRIFT = 4.0
 """Of a residual, a step with the matrix of the step before leaves the relative change of the limits times this."""
+RETRY = 0.5
+"""Work of a step whose matrix had to be shifted and built again, in steps: it ends there."""
 RETRIES = 8
 """Most step lengths tried in one iteration."""
 
@@ -293,23 +295,23 @@ def drone_limits(d, mass, thrust, gravity, cos_tilt, tan_lean, acceleration, dat
 
 
 @inline
-def near_pairs(n, limit, edge, kappa, start, apart, work):  # type: ignore[no-untyped-def]
+def near_pairs(n, limit, edge, kappa, rho, start, apart, work):  # type: ignore[no-untyped-def]
     """List the pairs ``(i, j)``, ``j < i``, closer than where the cosine is ``edge``; their number.
 
     ``limit`` is that of the least angle, the widest of all pairs where each has its own.
 
-    ``first[i]`` becomes the first neighbour of cable i: the envelope of the sparse matrix. A pair that
+    ``first[i]`` becomes the first neighbour of cable i, ``strong[i]`` the first in a strong pair: the envelope of the sparse matrix. A pair that
     is too close may not come closer than half of the way that recovery gained.
     """
     alpha, pairs, first = work.alpha, work.pairs, work.first
-    kappa_pair, cos_max = work.kappa_pair, work.cos_max
+    strong, kappa_pair, cos_max = work.strong, work.kappa_pair, work.cos_max
     scale = 1.0 / (limit - edge)
     wide = recovery.window(n, edge, alpha)
     m = 0
     begin = 0
     for i in range(n):
         x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
-        first[i] = i
+        first[i] = strong[i] = i
         while x - alpha[3 * begin] > wide:
             begin += 1
         for j in range(begin, i):
@@ -334,6 +336,8 @@ def near_pairs(n, limit, edge, kappa, start, apart, work):  # type: ignore[no-un
                     old += start[3 * i + 2] * start[3 * j + 2]
                     cos_max[m] = max(most, max(0.5 * (old + c), c + recovery.ROOM))
                     kappa_pair[m] = min(kappa_pair[m], recovery.FIRM * (cos_max[m] - c))
+                if strong[i] == i and newton.is_strong(c, cos_max[m] - c, kappa_pair[m], rho):
+                    strong[i] = j
                 m += 1
     return m
 
@@ -378,7 +382,7 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
     g, g_new, z, S, lam = work.g, work.g_new, work.z, work.S, work.lam
     newton.margins(n, limits, caps, m, work, w, g)
     spread_now = spread
-    iterations = 0
+    iterations = failed = 0
     waited = 0
     held = False
     sharp = False
@@ -427,6 +431,7 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
             else:
                 cost, mu_now, rho_now, kappa_now, rate_now = 1.0, mu, rho, kappa, kappa_rate
                 spread_next = spread
+            newton.lay_out(n, yielding, work)
             ratio = spread_next / spread_now
             spread_now = spread_next
             for i in range(n):
@@ -447,7 +452,7 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
             if residual <= tolerance:
                 outcome = CONVERGED
                 break
-            if iterations >= max_iterations:
+            if iterations + RETRY * failed >= max_iterations:
                 break
             good = (
                 residual * residual <= tolerance * origin if again else residual * left <= tolerance
@@ -476,14 +481,15 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
                 if settled and residual <= tolerance:
                     outcome = CONVERGED
                     break
-                if iterations >= max_iterations:
+                if iterations + RETRY * failed >= max_iterations:
                     break
             fresh = False
             if not newton.factor(n, shift, mu_now, work):
                 # Not convex here: build again, with a larger shift.
                 shift = max(1e-2, 30.0 * shift)
                 attempts += 1
-                if attempts > 12:
+                failed += 1
+                if attempts > 12 or iterations + RETRY * failed >= max_iterations:
                     break
                 continue
             attempts = 0

@@ -134,6 +134,7 @@ def near_ellipsoids(n, m, reach, delta, kappa, sure, slack, firm, start, apart, 
             g = room(i, j, apart, x, y, z, u, v, w)
             if g < edge:
                 first[i] = min(first[i], j)
+                work.strong[i] = min(work.strong[i], j)
                 pairs[2 * m] = i
                 pairs[2 * m + 1] = j
                 fade = min(1.0 - g / edge, 1.0)
@@ -191,11 +192,13 @@ def add_gradient(caps, m, begin, work, G):  # type: ignore[no-untyped-def]
 
 
 @inline
-def assemble(n, caps, m, begin, width, work):  # type: ignore[no-untyped-def]
-    """Their part of gradients and Hessians, into ``rows`` (``width`` each) and the blocks of ``K``."""
+def assemble(n, caps, m, begin, width, block_of, work):  # type: ignore[no-untyped-def]
+    """Their part of gradients and Hessians, into ``rows`` (``width`` each) and the blocks of ``K``.
+
+    ``block_of``: :func:`colift.control.allocation.limits.newton.block_of`.
+    """
     T, alpha, pairs, root, rows, K = work.T, work.alpha, work.pairs, work.root, work.rows, work.K
     flat = work.flat
-    size = 2 * n
     for k in range(caps, m):
         i = int(pairs[2 * k])
         j = int(pairs[2 * k + 1])  # j < i
@@ -244,16 +247,16 @@ def assemble(n, caps, m, begin, width, work):  # type: ignore[no-untyped-def]
         rows[oj + 12] += stiff * uj2 * uj2 + zk * around
         rows[oj + 12] -= bend * (dj0 * dj0 + dj1 * dj1 + flat * dj2 * dj2)
         scale = 1.0 / (T[i] * T[j])
-        top = size * 2 * i + 2 * j
-        low = top + size
+        top, down, right = block_of(n, i, j, work)
+        low = top + down
         across = bi0 * bj0 + bi1 * bj1 + flat * bi2 * bj2
         K[top] += scale * (stiff * ui1 * uj1 + zk * across)
         across = bi0 * dj0 + bi1 * dj1 + flat * bi2 * dj2
-        K[top + 1] += scale * (stiff * ui1 * uj2 + zk * across)
+        K[top + right] += scale * (stiff * ui1 * uj2 + zk * across)
         across = di0 * bj0 + di1 * bj1 + flat * di2 * bj2
         K[low] += scale * (stiff * ui2 * uj1 + zk * across)
         across = di0 * dj0 + di1 * dj1 + flat * di2 * dj2
-        K[low + 1] += scale * (stiff * ui2 * uj2 + zk * across)
+        K[low + right] += scale * (stiff * ui2 * uj2 + zk * across)
 
 
 @inline

@@ -52,6 +52,7 @@ from typing import Any, NamedTuple
 
 from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
+from colift.kernel.math.vectors import eliminate
 
 TENSION_MAX, TENSION_MIN, CONE, RATE, THRUST, TILT = range(6)
 LIMITS = 6
@@ -69,6 +70,13 @@ While the pairs are summed up, ``gamma`` and its barrier version stand where ``a
 
 RHS = 9
 """Columns of the right-hand side: zeta (5), lam (3), q."""
+PITCH = 12
+"""Numbers from one row of it to the next: what is behind the ninth is zero."""
+
+DENSE = 8
+"""Teams of up to so many cables have their matrix as a square; larger ones by columns, as long as the envelope is."""
+STRONG = 0.004
+"""Stiffness of a pair over that of the proximal term from which on it is strong."""
 
 SYSTEM = 8 * 8 + 8
 
@@ -100,13 +108,18 @@ class Work(NamedTuple):
     flat: float
     """Of ellipsoids, ``1 / stretch^2``."""
     first: Any
-    """First near neighbour of every cable."""
+    strong: Any
+    """First near neighbour of every cable, and first of those whose pair is stiff, see :func:`is_strong`."""
+    last: Any
+    begin: Any
+    """Last cable in the columns of every cable, and where in ``K`` they begin, see :func:`lay_out`."""
     rows: Any
     """``ROW`` per cable and step."""
     K: Any
     Y: Any
     S: Any
-    """The matrix and its factor, ``L^-1 [U^T, q]``, the reduced system."""
+    eta: Any
+    """The matrix and its factor, ``L^-1 [U^T, q]``, the reduced system, and what it leaves for every cable (2n)."""
     lam: Any
     M: Any
     """Multiplier of the force balance (3), ``sum alpha alpha^T`` (6)."""
@@ -120,6 +133,51 @@ class Weights(NamedTuple):
     rho: float
     kappa: float
     kappa_rate: float
+
+
+@inline
+def is_strong(c, g, kappa, rho):  # type: ignore[no-untyped-def]
+    """Whether a pair with the cosine c and the margin g couples its cables noticeably beside the proximal term."""
+    return kappa * (1.0 - c * c + g) > STRONG * rho * g * g
+
+
+@inline
+def lay_out(n, whole, work):  # type: ignore[no-untyped-def]
+    """Where the columns of every cable stand in ``K``; none where the matrix is a square.
+
+    Cable j has two columns, one behind the other. Each has the rows of the cables j to ``last[j]``, two for each, and two more
+    that are zero. All that the factor fills is within these: ``last`` never falls from cable to cable. Not ``whole`` leaves out
+    pairs that are not strong and beyond all that are: steps take them for fixed, gradients do not.
+    """
+    if n <= DENSE:
+        return
+    last, begin = work.last, work.begin
+    for j in range(n):
+        last[j] = j
+    for i in range(n):
+        j = int(work.first[i] if whole else work.strong[i])
+        last[j] = i
+    at = 0
+    reached = 0
+    for j in range(n):
+        reached = max(reached, int(last[j]))
+        last[j] = reached
+        begin[j] = at
+        at += 2 * height(j, last)
+
+
+@inline
+def height(j, last):  # type: ignore[no-untyped-def]
+    """Numbers in one column of cable j."""
+    return 2 * (int(last[j]) - j) + 4
+
+
+@inline
+def block_of(n, i, j, work):  # type: ignore[no-untyped-def]
+    """Where the block of the cables i and j < i stands in ``K``, the way to its next row and to its next column."""
+    if n <= DENSE:
+        return 4 * n * i + 2 * j, 2 * n, 1
+    return int(work.begin[j]) + 2 * (i - j), 1, height(j, work.last)
 
 
 @inline
@@ -173,7 +231,6 @@ def assemble(n, limits, caps, m, weights, work):  # type: ignore[no-untyped-def]
     data, T, alpha, g, z, M = work.data, work.T, work.alpha, work.g, work.z, work.M
     pairs, kappa_pair, first = work.pairs, work.kappa_pair, work.first
     rows, K = work.rows, work.K
-    size = 2 * n
     xx = xy = xz = yy = yz = zz = 0.0
     for i in range(n):
         x = alpha[3 * i]
@@ -198,15 +255,19 @@ def assemble(n, limits, caps, m, weights, work):  # type: ignore[no-untyped-def]
         rows[o + 5] = -y
         for k in range(6, ROW):
             rows[o + k] = 0.0
-        for k in range(2 * int(first[i]), 2 * i):
-            K[size * 2 * i + k] = 0.0
-            K[size * (2 * i + 1) + k] = 0.0
+        if n <= DENSE:
+            for k in range(2 * int(first[i]), 2 * i):
+                K[4 * n * i + k] = 0.0
+                K[4 * n * i + 2 * n + k] = 0.0
     M[0] = xx
     M[1] = xy
     M[2] = xz
     M[3] = yy
     M[4] = yz
     M[5] = zz
+    if n > DENSE:
+        for k in range(int(work.begin[n - 1]) + 2 * height(n - 1, work.last)):
+            K[k] = 0.0
 
     for k in range(caps):
         i = int(pairs[2 * k])
@@ -242,14 +303,16 @@ def assemble(n, limits, caps, m, weights, work):  # type: ignore[no-untyped-def]
         rows[oj + 10] += stiff * uj1 * uj1 - zk * c
         rows[oj + 11] += stiff * uj1 * uj2
         rows[oj + 12] += stiff * uj2 * uj2 - zk * c
+        if n > DENSE and i > work.last[j]:
+            continue
         scale = 1.0 / (T[i] * T[j])
-        top = size * 2 * i + 2 * j
-        low = top + size
+        top, down, right = block_of(n, i, j, work)
+        low = top + down
         K[top] = scale * (stiff * ui1 * uj1 + zk * (bi0 * bj0 + bi1 * bj1 + bi2 * bj2))
-        K[top + 1] = scale * (stiff * ui1 * uj2 + zk * (bi0 * dj0 + bi1 * dj1 + bi2 * dj2))
+        K[top + right] = scale * (stiff * ui1 * uj2 + zk * (bi0 * dj0 + bi1 * dj1 + bi2 * dj2))
         K[low] = scale * (stiff * ui2 * uj1 + zk * (di0 * bj0 + di1 * bj1 + di2 * bj2))
-        K[low + 1] = scale * (stiff * ui2 * uj2 + zk * (di0 * dj0 + di1 * dj1 + di2 * dj2))
-    distance.assemble(n, caps, m, LIMITS * n, ROW, work)
+        K[low + right] = scale * (stiff * ui2 * uj2 + zk * (di0 * dj0 + di1 * dj1 + di2 * dj2))
+    distance.assemble(n, caps, m, LIMITS * n, ROW, block_of, work)
 
     for i in range(n):
         d = DATA * i
@@ -475,9 +538,16 @@ def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
 
     False if ``K + shift I`` is not positive definite.
     """
-    T, alpha, first = work.T, work.alpha, work.first
-    rows, K, Y = work.rows, work.K, work.Y
-    size = 2 * n
+    right_sides(n, mu, work)
+    if n <= DENSE:
+        return factor_square(n, shift, work)
+    return factor_columns(n, shift, work)
+
+
+@inline
+def right_sides(n, mu, work):  # type: ignore[no-untyped-def]
+    """``[U^T, q]`` into ``Y``."""
+    T, alpha, rows, Y = work.T, work.alpha, work.rows, work.Y
     root = math.sqrt(2.0 * mu)
     root_a = math.sqrt(2.0 * mu)
     root_b = math.sqrt(6.0 * mu)
@@ -491,14 +561,11 @@ def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
         rows[o + 19] = inverse
         h1, h2 = rows[o + 15] * inverse, rows[o + 16] * inverse
         rt = rows[o + 18]
-        c00 = rows[o + 10] - h1 * rows[o + 15] + shift
-        c10 = rows[o + 11] - h1 * rows[o + 16]
-        c11 = rows[o + 12] - h2 * rows[o + 16] + shift
         ra = root * inv
         rb = root_a * inv
         rc = root_b * inv
-        k0 = RHS * 2 * i
-        k1 = k0 + RHS
+        k0 = PITCH * 2 * i
+        k1 = k0 + PITCH
         Y[k0] = ra * (x * b1 + y * b0)
         Y[k0 + 1] = ra * (x * b2 + zc * b0)
         Y[k0 + 2] = ra * (y * b2 + zc * b1)
@@ -517,6 +584,29 @@ def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
         Y[k1 + 6] = d1 - y * h2
         Y[k1 + 7] = d2 - zc * h2
         Y[k1 + 8] = rows[o + 14] - h2 * rt
+
+
+@inline
+def own_block(i, shift, rows):  # type: ignore[no-untyped-def]
+    """``C_i`` without ``tau``, shifted: lower triangle."""
+    o = ROW * i
+    inverse = rows[o + 19]
+    h1, h2 = rows[o + 15] * inverse, rows[o + 16] * inverse
+    c00 = rows[o + 10] - h1 * rows[o + 15] + shift
+    c10 = rows[o + 11] - h1 * rows[o + 16]
+    c11 = rows[o + 12] - h2 * rows[o + 16] + shift
+    return c00, c10, c11
+
+
+@inline
+def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
+    """Row by row, each cable's two within their envelope: for few cables."""
+    first, rows, K, Y = work.first, work.rows, work.K, work.Y
+    size = 2 * n
+    for i in range(n):
+        c00, c10, c11 = own_block(i, shift, rows)
+        k0 = PITCH * 2 * i
+        k1 = k0 + PITCH
         top = size * 2 * i
         low = top + size
         for j in range(int(first[i]), i):
@@ -545,8 +635,8 @@ def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
             c00 -= s00 * s00 + s01 * s01
             c10 -= s00 * s10 + s01 * s11
             c11 -= s10 * s10 + s11 * s11
-            q0 = RHS * 2 * j
-            q1 = q0 + RHS
+            q0 = PITCH * 2 * j
+            q1 = q0 + PITCH
             for k in range(RHS):
                 Y[k0 + k] -= s00 * Y[q0 + k] + s01 * Y[q1 + k]
                 Y[k1 + k] -= s10 * Y[q0 + k] + s11 * Y[q1 + k]
@@ -564,6 +654,47 @@ def factor(n, shift, mu, work):  # type: ignore[no-untyped-def]
         for k in range(RHS):
             Y[k0 + k] *= i0
             Y[k1 + k] = (Y[k1 + k] - l10 * Y[k0 + k]) * i1
+    return True
+
+
+@inline
+def factor_columns(n, shift, work):  # type: ignore[no-untyped-def]
+    """Column by column, each cable's two less all that reach so far: the long loops are along columns and right sides."""
+    last, begin, rows, K, Y = work.last, work.begin, work.rows, work.K, work.Y
+    lowest = 0
+    for j in range(n):
+        while last[lowest] < j:
+            lowest += 1
+        c = int(begin[j])
+        s = c + height(j, last)
+        c00, c10, c11 = own_block(j, shift, rows)
+        K[c] = c00
+        K[c + 1] = c10
+        K[s + 1] = c11
+        y0 = PITCH * 2 * j
+        y1 = y0 + PITCH
+        for k in range(lowest, j):
+            one = int(begin[k]) + 2 * (j - k)
+            two = one + height(k, last)
+            a00, a01, a10, a11 = K[one], K[two], K[one + 1], K[two + 1]
+            eliminate(K, 2 * (int(last[k]) - j + 1), c, s, one, two, a00, a01, a10, a11)
+            q0 = PITCH * 2 * k
+            eliminate(Y, PITCH, y0, y1, q0, q0 + PITCH, a00, a01, a10, a11)
+        if not K[c] > 1e-10:
+            return False
+        i0 = 1.0 / math.sqrt(K[c])
+        l10 = K[c + 1] * i0
+        c11 = K[s + 1] - l10 * l10
+        if not c11 > 1e-10:
+            return False
+        i1 = 1.0 / math.sqrt(c11)
+        for r in range(2, 2 * (int(last[j]) - j + 1)):
+            K[c + r] *= i0
+            K[s + r] = (K[s + r] - l10 * K[c + r]) * i1
+        K[c], K[c + 1], K[s + 1] = i0, l10, i1
+        for k in range(RHS):
+            Y[y0 + k] *= i0
+            Y[y1 + k] = (Y[y1 + k] - l10 * Y[y0 + k]) * i1
     return True
 
 
@@ -593,7 +724,7 @@ def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
         S[71] -= part * z
     # A few sums at a time, as many as fit into registers.
     a00 = a10 = a11 = a20 = a21 = a22 = a30 = a31 = a32 = a33 = a40 = a41 = a42 = a43 = a44 = 0.0
-    for r in range(0, 2 * RHS * n, RHS):
+    for r in range(0, 2 * PITCH * n, PITCH):
         y0, y1, y2, y3, y4 = Y[r], Y[r + 1], Y[r + 2], Y[r + 3], Y[r + 4]
         a00 += y0 * y0
         a10 += y1 * y0
@@ -617,7 +748,7 @@ def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
     S[32], S[33], S[34], S[35], S[36] = a40, a41, a42, a43, S[36] + a44
     for k in range(5, 9):
         a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = 0.0
-        for r in range(0, 2 * RHS * n, RHS):
+        for r in range(0, 2 * PITCH * n, PITCH):
             y = Y[r + k]
             a0 += y * Y[r]
             a1 += y * Y[r + 1]
@@ -709,9 +840,8 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
 
     From the gradient in ``w_new``, in the frames of the matrix, and ``(rx, ry, rz) = sum w + F``.
     """
-    first, G = work.first, work.w_new
+    first, G, eta = work.first, work.w_new, work.eta
     rows, K, Y, S = work.rows, work.K, work.Y, work.S
-    size = 2 * n
     for k in range(5):
         S[64 + k] = 0.0
     S[69] = rx
@@ -731,18 +861,29 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
         S[69] -= part * x
         S[70] -= part * y
         S[71] -= part * z
-        y0 = q1 - rows[o + 15] * part
-        y1 = q2 - rows[o + 16] * part
-        top = size * 2 * i
-        low = top + size
-        for j in range(int(first[i]), i):
-            v0, v1 = Y[RHS * 2 * j + 8], Y[RHS * (2 * j + 1) + 8]
-            y0 -= K[top + 2 * j] * v0 + K[top + 2 * j + 1] * v1
-            y1 -= K[low + 2 * j] * v0 + K[low + 2 * j + 1] * v1
-        y0 *= K[top + 2 * i]
-        y1 = (y1 - K[low + 2 * i] * y0) * K[low + 2 * i + 1]
-        k0 = RHS * 2 * i
-        k1 = k0 + RHS
+        eta[2 * i] = q1 - rows[o + 15] * part
+        eta[2 * i + 1] = q2 - rows[o + 16] * part
+    for i in range(n):
+        k0 = PITCH * 2 * i
+        k1 = k0 + PITCH
+        y0, y1 = eta[2 * i], eta[2 * i + 1]
+        if n <= DENSE:
+            top = 4 * n * i
+            low = top + 2 * n
+            for j in range(int(first[i]), i):
+                v0, v1 = eta[2 * j], eta[2 * j + 1]
+                y0 -= K[top + 2 * j] * v0 + K[top + 2 * j + 1] * v1
+                y1 -= K[low + 2 * j] * v0 + K[low + 2 * j + 1] * v1
+            y0 *= K[top + 2 * i]
+            y1 = (y1 - K[low + 2 * i] * y0) * K[low + 2 * i + 1]
+        else:
+            c = int(work.begin[i])
+            s = c + height(i, work.last)
+            y0 *= K[c]
+            y1 = (y1 - K[c + 1] * y0) * K[s + 1]
+            for r in range(2, 2 * (int(work.last[i]) - i + 1)):
+                eta[2 * i + r] -= K[c + r] * y0 + K[s + r] * y1
+        eta[2 * i], eta[2 * i + 1] = y0, y1
         Y[k0 + 8] = y0
         Y[k1 + 8] = y1
         for k in range(8):
@@ -752,27 +893,38 @@ def next_right_side(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
 @inline
 def back_substitute(n, work):  # type: ignore[no-untyped-def]
     """``dw`` of every cable from the solution in ``S[64:]``; the largest component of the Lagrangian's gradient before it."""
-    first, dw = work.first, work.dw
+    first, dw, eta = work.first, work.dw, work.eta
     rows, K, Y, S = work.rows, work.K, work.Y, work.S
-    size = 2 * n
     for r in range(2 * n):
-        o = RHS * r
+        o = PITCH * r
         value = Y[o + 8]
         for k in range(8):
             value += Y[o + k] * S[64 + k]
-        Y[o + 8] = -value
+        eta[r] = -value
     lx, ly, lz = S[69], S[70], S[71]
     worst = 0.0
     for i in range(n - 1, -1, -1):
-        top = size * 2 * i
-        low = top + size
-        k0 = RHS * 2 * i + 8
-        k1 = k0 + RHS
-        eta2 = Y[k1] * K[low + 2 * i + 1]
-        eta1 = (Y[k0] - K[low + 2 * i] * eta2) * K[top + 2 * i]
-        for j in range(int(first[i]), i):
-            Y[RHS * 2 * j + 8] -= K[top + 2 * j] * eta1 + K[low + 2 * j] * eta2
-            Y[RHS * (2 * j + 1) + 8] -= K[top + 2 * j + 1] * eta1 + K[low + 2 * j + 1] * eta2
+        eta1, eta2 = eta[2 * i], eta[2 * i + 1]
+        if n <= DENSE:
+            top = 4 * n * i
+            low = top + 2 * n
+            eta2 *= K[low + 2 * i + 1]
+            eta1 = (eta1 - K[low + 2 * i] * eta2) * K[top + 2 * i]
+            for k in range(2 * int(first[i]), 2 * i):
+                eta[k] -= K[top + k] * eta1 + K[low + k] * eta2
+        else:
+            c = int(work.begin[i])
+            s = c + height(i, work.last)
+            a, b = 0.0, 0.0
+            for r in range(2, 2 * (int(work.last[i]) - i + 1), 2):
+                u, v = eta[2 * i + r], eta[2 * i + r + 1]
+                eta1 -= K[c + r] * u
+                eta2 -= K[s + r] * u
+                a += K[c + r + 1] * v
+                b += K[s + r + 1] * v
+            eta2 = (eta2 - b) * K[s + 1]
+            eta1 = (eta1 - a - K[c + 1] * eta2) * K[c]
+            eta[2 * i], eta[2 * i + 1] = eta1, eta2
         o = ROW * i
         x, y, z = rows[o + 6], rows[o + 7], rows[o + 8]
         rt = rows[o + 18] + lx * x + ly * y + lz * z
