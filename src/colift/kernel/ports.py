@@ -216,13 +216,17 @@ def _named(prefix: str) -> tuple[str, ...]:
     return tuple(f"{prefix}_{name}" for name in _TRUE.split())
 
 
+_FELT = ("measured_specific_forces", "specific_force_ages")
 _RECEIVED = ("received_tensions", "received_directions", "received_ages")
 
 PORTS: dict[str, Port] = {
     port.name: port
     for port in (
         Port("sensing", sees=(*_TRUE.split(), "stuck")),
-        Port("estimation", sees=(*_named("measured"), "measured_ages", "thrusts", *_RECEIVED)),
+        Port(
+            "estimation",
+            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", *_RECEIVED),
+        ),
         Port(
             "supervision",
             sees=(
@@ -244,8 +248,8 @@ PORTS: dict[str, Port] = {
         Port(
             "observation",
             sees=(
-                *_named("estimated"), "estimated_ends", "thrusts", "standing", "held_forces",
-                *_RECEIVED,
+                *_named("estimated"), "estimated_ends", *_FELT, "thrusts", "standing",
+                "held_forces", *_RECEIVED,
             ),
         ),
         Port(

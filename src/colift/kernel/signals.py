@@ -106,6 +106,8 @@ SIGNALS = (
     Signal("spans", ("n", 3), "m, m/s, m/s^2", "r_i - L_i", "-", "distance that each drone keeps from its cable's end, less the cable's length; two derivatives", writer="supervision"),
     Signal("unhooked", ("n",), "1", "-", "-", "1 for each cable that is told to let go of the load", writer="supervision"),
     Signal("lifted_mass", (1,), "kg", "-", "-", "mass of the load as weighed at lift-off; 0 where nobody weighs it", writer="supervision"),
+    Signal("measured_specific_forces", ("n", 3), "m/s^2", "-", "body", "acceleration of each drone less gravity's, as its accelerometer measures it", writer="sensing"),
+    Signal("specific_force_ages", ("n",), "s", "-", "-", "time since those samples were taken", writer="sensing"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 
