@@ -225,13 +225,13 @@ PORTS: dict[str, Port] = {
         Port("sensing", sees=(*_TRUE.split(), "stuck")),
         Port(
             "estimation",
-            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", *_RECEIVED),
+            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", "reeled", *_RECEIVED),
         ),
         Port(
             "supervision",
             sees=(
                 *_named("estimated"), "estimated_ends", "estimated_forces", "estimated_wind", "thrusts",
-                "reference", *_RECEIVED,
+                "reference", "reeled", *_RECEIVED,
             ),
         ),
         Port("reference", sees=()),
@@ -256,7 +256,7 @@ PORTS: dict[str, Port] = {
             "position_control",
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
-                "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses",
+                "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses", "reeled",
                 *_RECEIVED,
             ),
         ),
@@ -272,11 +272,14 @@ PORTS: dict[str, Port] = {
             "detection",
             sees=(
                 "estimated_ends", *_named("estimated")[1:4], "estimated_ages", "thrusts",
-                "lift_share", *_RECEIVED,
+                "lift_share", "reeled", *_RECEIVED,
             ),
         ),
         Port("plant_observe", sees=()),
-        Port("plant", sees=("applied_thrusts", "applied_torques", "external_forces", "attached")),
+        Port(
+            "plant",
+            sees=("applied_thrusts", "applied_torques", "external_forces", "attached", "winches"),
+        ),
         Port(
             "disturbance",
             sees=(

@@ -390,9 +390,15 @@ class Timing(Section):
 
 _CHANGING = "|".join(layer for layer in LAYERS if layer not in ("plant", "reference"))
 EVENT_FIELDS = (
-    r"^(load\.mass|drones\.(lose|join)|reference"
+    r"^(load\.mass|drones\.(lose|join|cable_length)|reference"
     rf"|({_CHANGING}|disturbance\.[0-9]{{1,3}})(\.[a-z_]+)?)$"
 )
+
+
+PEAK_SPEED, PEAK_BEND = 35.0 / 16.0, 84.0 * math.sqrt(5.0) / 25.0
+"""Of the septic way from rest to rest over one metre in one second (:func:`colift.kernel.math.smooth.rest_to_rest`)."""
+MOST_WINDING = 1.0
+"""Most acceleration of a winch's cable, m/s^2."""
 
 
 class Event(Section):
@@ -401,19 +407,33 @@ class Event(Section):
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
     field: Annotated[str, Field(pattern=EVENT_FIELDS)]
-    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, a setting of a layer
+    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, ``drones.cable_length``, a setting of a layer
     or of a disturbance such as ``allocation.mu`` or ``disturbance.0.force``, or a whole section such as
     ``reference``; ``allocation.kind`` puts another allocator, with its defaults, in place."""
     value: Any
     """New value, in the field's unit; for a section a table with ``kind`` and settings; for ``drones.lose`` the number, from 0, of the drone whose cable is
     cut and that leaves the team, which is told at once; for ``drones.join`` the drone that hooks in then, in
-    the widest gap between the cables, at the load's velocity, and that is not there before."""
+    the widest gap between the cables, at the load's velocity, and that is not there before; for ``drones.cable_length`` the
+    length to which winches bring the cables of the drones that fly then, m, one value or one per drone, which the controllers know."""
+    rate: Annotated[float, Field(gt=0.0, le=10.0)] = 0.2
+    """Of ``drones.cable_length``: fastest that a winch pays out or takes in, m/s. It goes smoothly from rest to rest, with
+    1 m/s^2 at most."""
 
     @property
     def of_team(self) -> str:
         """``"lose"`` or ``"join"`` where the drone ``value`` leaves or joins; empty for other changes."""
         section, _, name = self.field.rpartition(".")
-        return name if section == "drones" else ""
+        return name if section == "drones" and not self.of_winches else ""
+
+    @property
+    def of_winches(self) -> bool:
+        """Whether winches pay cable out or take it in."""
+        return self.field == "drones.cable_length"
+
+    def winding(self, change: float) -> float:
+        """Time that a winch takes for this change of a cable's length (m), s."""
+        way = abs(change)
+        return max(PEAK_SPEED * way / self.rate, math.sqrt(PEAK_BEND * way / MOST_WINDING))
 
 
 class Bound(Section):

@@ -227,7 +227,9 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         guess = (
             memory[s], memory[s + 1], memory[s + 2], memory[s + 3], memory[s + 4], memory[s + 5]
         )  # fmt: skip
-        found = load_from_drones(n, width + s, width, memory, P.rows + P.L, P.width, params, guess)
+        found = load_from_drones(
+            n, width + s, width, memory, P.rows + P.L, P.width, params, sees.reeled, guess
+        )
         for k in range(6):
             memory[B.sample + k] = found[k]
         memory[B.waited] = params[P.patience]

@@ -156,6 +156,12 @@ def _feel(sees, params, memory, dt):  # type: ignore[no-untyped-def]
 
 
 @inline
+def _length(i, sees, params):  # type: ignore[no-untyped-def]
+    """Length of cable i as it is wound out, m."""
+    return params[P.rows + P.width * i + P.L] + sees.reeled[i, 0]
+
+
+@inline
 def _forget(i, sees, params, memory):  # type: ignore[no-untyped-def]
     """Begin to feel drone i anew, without the ground."""
     p, o = P.rows + P.width * i, M.rows + M.width * i
@@ -270,7 +276,7 @@ def _reel(i, dt, memory):  # type: ignore[no-untyped-def]
 def _formed(sees, params, memory):  # type: ignore[no-untyped-def]
     """Whether all drones are at rest at their places in the formation."""
     for i in range(sees.estimated_positions.shape[0]):
-        L = params[P.rows + P.width * i + P.L]
+        L = _length(i, sees, params)
         away = fast = 0.0
         for k in range(3):
             place = memory[M.place + k] - NEAR * L * sees.received_directions[i, k]
@@ -323,8 +329,7 @@ def _hook(time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
                 memory[o + M.bias + k] = memory[o + M.mean + k]
     hooked, lost = 0.0, 0.0
     for i in range(n):
-        p, o = P.rows + P.width * i, M.rows + M.width * i
-        L = params[p + P.L]
+        o, L = M.rows + M.width * i, _length(i, sees, params)
         distance, tension = _pull(i, sees, memory)
         if memory[o + M.hooked] == 0.0:
             span = memory[o + M.span]
@@ -441,7 +446,7 @@ def _land(time, dt, sees, params, memory, writes):  # type: ignore[no-untyped-de
     sink = phase(time - params[P.climb], 0.5, SINK)
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
-        L, m = params[p + P.L], params[p + P.m]
+        L, m = _length(i, sees, params), params[p + P.m]
         b = memory[o + M.start : o + M.start + 3]
         centre = memory[M.goal : M.goal + 3]
         start = (b[0] - centre[0], b[1] - centre[1], b[2] - centre[2])
@@ -476,7 +481,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if memory[M.started] == 0.0:
         above = 0.0
         for i in range(n):
-            above += (x[i, 2] - load[0, 2]) / params[P.rows + P.width * i + P.L] / n
+            above += (x[i, 2] - load[0, 2]) / _length(i, sees, params) / n
         memory[M.ground] = params[P.ground]
         memory[M.phase], memory[M.since] = (STAND, t) if above < 0.2 else (FLY, t)
         memory[M.share] = 0.0 if above < 0.2 else 1.0
@@ -490,7 +495,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         for k in range(3):
             place[k] += (load[0, k] - place[k]) / memory[M.count]
         for i in range(n):
-            o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+            o, L = M.rows + M.width * i, _length(i, sees, params)
             memory[o + M.span] = (NEAR - 1.0) * L
             for k in range(3):
                 memory[o + M.start + k] += (x[i, k] - memory[o + M.start + k]) / memory[M.count]
@@ -504,7 +509,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         s, s1, s2, _ = rest_to_rest(time / params[P.climb])
         s1, s2 = s1 / params[P.climb], s2 / params[P.climb] ** 2
         for i in range(n):
-            o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+            o, L = M.rows + M.width * i, _length(i, sees, params)
             a = sees.received_directions[i]
             b = memory[o + M.start : o + M.start + 3]
             start = (b[0] - place[0], b[1] - place[1], b[2] - place[2])
@@ -539,7 +544,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         part = min(time / HAND_OVER, 1.0)
         memory[M.share] = memory[M.rising] + part * (1.0 - memory[M.rising])
         for i in range(n):
-            o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+            o, L = M.rows + M.width * i, _length(i, sees, params)
             found = min(max(memory[o + M.length], 0.9 * L), 1.1 * L) - L
             pace = found - memory[o + M.span]
             memory[o + M.want] = min(max(2.0 * pace, -0.05 * L), 0.05 * L)
@@ -595,7 +600,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     elif now_in == SLACKEN:
         done = time >= REST
         for i in range(n):
-            o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+            o, L = M.rows + M.width * i, _length(i, sees, params)
             pace = (NEAR - 1.0) * L - memory[o + M.span]
             memory[o + M.want] = min(max(2.0 * pace, -0.1 * L), 0.1 * L)
             done = done and abs(pace) < 0.01 * L
@@ -607,7 +612,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         elif done:
             _go(memory, RELEASE if params[P.release] != 0.0 else LAND, t)
             for i in range(n):
-                o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+                o, L = M.rows + M.width * i, _length(i, sees, params)
                 memory[o + M.want] = memory[o + M.sign] = memory[o + M.down] = 0.0
                 for k in range(3):
                     memory[o + M.start + k] = (

@@ -21,6 +21,11 @@ Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
 class BeadCables(ChainPart):
     """Elastic cables with mass and air drag, in beads."""
 
+    reels = (
+        "its ropes are beads of fixed mass: to pay out more of a rope with mass, mass would have to come from a drum, "
+        "which its drones do not have"
+    )
+
     beads: Annotated[int, Field(ge=1, le=64)] = 3
     """Beads per cable."""
     density: Annotated[float, Field(gt=0.0, le=10.0)] = 6.5e-4

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from colift.kernel.math.winch import paid_out
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
@@ -115,6 +116,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     substeps = max(int(params[-1]), math.ceil(2.0 * dt / params[-SETTINGS] - 1e-9))
     model.opt.timestep = dt / substeps
     model.tendon_limited[:] = attached > 0.0
+    lengths = params[MASS + 1 : -SETTINGS : BODY]
     data.qpos[:] = state[scene.qpos]
     data.qvel[:] = state[scene.qvel]
     data.qacc_warmstart[:] = warm_start
@@ -125,6 +127,9 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     data.xfrc_applied[2:, :3] = external[:n]
     reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
     for substep in range(substeps):
+        at = now.time + substep * dt / substeps
+        wound = np.array([paid_out(sees.winches, i, at) for i in range(n)])
+        model.tendon_range[:, 1] = lengths + wound @ _ahead(params)
         mujoco.mj_forward(model, data)
         pressed = _contacts(scene, writes.ground_forces if substep == 0 else np.zeros((n + 1, 3)))
         limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
@@ -134,9 +139,9 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             tensions[:] = pulls
         np.maximum(peak_tensions, np.append(pulls, pulls.sum()), out=peak_tensions)
         slack_times[(pulls == 0.0) & (attached > 0.0)] += dt / substeps
-        holds, taut = attached > 0.0, data.ten_length > model.tendon_range[:, 1]
+        holds, taut = attached > 0.0, data.ten_length > lengths + wound[:, 0]
         np.maximum(catch_impulses, reduced * parting, out=catch_impulses, where=holds & taut)
-        parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity, 0.0), 0.0)
+        parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity - wound[:, 1], 0.0), 0.0)
         sinking = -np.append(data.qvel[5::6], data.qvel[2])
         mujoco.mj_step(model, data)
         if model.ngeom:
@@ -150,6 +155,17 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if data.warning.number.any():
         mujoco.mj_resetData(model, data)
         state[:] = np.nan
+
+
+def _ahead(params: Vector) -> Vector:
+    """Shift of a tendon's limit by its length, rate and acceleration with which MuJoCo has the tendon follow a length that changes.
+
+    MuJoCo draws a tendon beyond its limit back by ``-b v - k r`` as if the limit stood still, with ``b = 2 / (d t)`` and
+    ``k = 1 / (d t z)^2`` of impedance ``d``, time constant ``t`` and damping ratio ``z``.
+    """
+    time_constant, damping_ratio, impedance = params[-SETTINGS:-1]
+    scale = impedance * time_constant * damping_ratio**2
+    return np.array([1.0, 2.0 * scale, impedance * time_constant * scale])
 
 
 def _contacts(scene: _Scene, forces: NDArray[np.float64]) -> NDArray[np.bool_]:
