@@ -80,12 +80,12 @@ class Flight:
             enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
         )
         self._disturbances: dict[int, DisturbancePart] = dict(winds_first)
-        self._load_mass = mission.true_team.load_mass
+        self._load_mass = mission.true_bodies.load_mass
         self._due: list[tuple[int, Due]] = sorted(timetable(mission), key=lambda item: item[0])
         self._legs: list[Leg] = []
         drones = mission.first_drones()
         start = start_state(mission)
-        self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
+        self._begin_leg(drones, self._fresh_memory(drones, start))
         bus = self.bus
         self.wires.reference.writes.reference[:] = bus.reference[:] = mission.reference.sample(
             np.zeros(1), mission.team.of(drones)
@@ -275,7 +275,7 @@ class Flight:
             else self._parts[layer].carry_over(
                 getattr(old.circuit.wires, layer).memory, fresh, places
             )
-            for layer, fresh in self._fresh_memory(team, start).items()
+            for layer, fresh in self._fresh_memory(drones, start).items()
         }
         self._begin_leg(drones, memory)
         bus = self.bus
@@ -527,9 +527,11 @@ class Flight:
         lengths[leg.drones] = self._told("allocation").cable_lengths
         self.membership.team = replace(self.membership.team, cable_lengths=lengths)
 
-    def _fresh_memory(self, team: Team, start: Start) -> dict[str, Vector]:
+    def _fresh_memory(self, drones: list[int], start: Start) -> dict[str, Vector]:
+        team = self.mission.team.of(drones)
         memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
-        return {**memory, "plant": self.mission.plant.initial(team, start)}
+        real = replace(team, cable_lengths=self.mission.true_bodies.cable_lengths[drones])
+        return {**memory, "plant": self.mission.plant.initial(real, start)}
 
     def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
         """From here on these drones of the mission fly; every layer is bound to their team."""
@@ -552,7 +554,8 @@ class Flight:
         self._legs.append(Leg(drones, team, bus, wired, self._step))
 
     def _true_team(self, drones: list[int]) -> Team:
-        return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
+        bodies = replace(self.mission.true_bodies.of(drones), load_mass=self._load_mass)
+        return self.mission.plant.team_of(bodies, self.mission.drones.cable_density)
 
 
 class Snapshot(NamedTuple):

@@ -22,7 +22,7 @@ from colift.mission.forecast import forecast
 from colift.mission.grounding import ground_checks
 from colift.mission.schema import Event, Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
-from colift.team import contact
+from colift.team import Team, contact
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
@@ -83,7 +83,7 @@ def cross_checks(
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
-            team = frame.true_team if part.layer == "plant" else frame.team
+            team = _of_plant(frame, part) if isinstance(part, PlantPart) else frame.team
             found = part.check(team)
             if must_fly and not (found or weak):
                 found = part.conflicts(team)
@@ -101,6 +101,11 @@ def cross_checks(
     yield from _fault_checks(frame, parts, lists["fault"], broken)
     yield from ground_checks(frame, parts, broken)
     yield from _supervision_checks(frame, parts)
+
+
+def _of_plant(frame: Frame, plant: PlantPart, **changes: Any) -> Team:
+    """The bodies as a plant has them."""
+    return plant.team_of(replace(frame.true_bodies, **changes), frame.drones.cable_density)
 
 
 def _supervision_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
@@ -281,8 +286,12 @@ def _event_checks(
             found = list(_setting_change(f"events.{i}", frame.load, section, name, event.value))
             yield from found
             if not found and not broken & {"world", "load", "drones", "truth"}:
-                team = replace(frame.true_team, load_mass=float(event.value))
-                for field, message in present["plant"].check(team) if "plant" in present else ():
+                plant = present.get("plant")
+                for field, message in (
+                    plant.check(_of_plant(frame, plant, load_mass=float(event.value)))
+                    if isinstance(plant, PlantPart)
+                    else ()
+                ):
                     yield Problem(
                         f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
                     )
@@ -342,12 +351,10 @@ def _winch_change(
     for name, part in parts.items():
         if part.layer in ("fault", "reference"):
             continue
-        team = (
-            replace(true, cable_lengths=left)
-            if part.layer == "plant"
-            else replace(frame.team, cable_lengths=wanted)
-        )
-        before = true if part.layer == "plant" else frame.team
+        if isinstance(part, PlantPart):
+            before, team = _of_plant(frame, part), _of_plant(frame, part, cable_lengths=left)
+        else:
+            before, team = frame.team, replace(frame.team, cable_lengths=wanted)
         if part.check(before) or (must_fly and part.conflicts(before)):
             continue  # told already
         problems = part.check(team) or (part.conflicts(team) if must_fly else [])

@@ -145,6 +145,9 @@ class Drones(Section):
     """Principal moments of inertia, body frame, kg m^2; left out, they are estimated where ``arm`` is known."""
     cable_length: PerDrone = 1.0
     """m."""
+    cable_density: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    """Mass of the cables per length, as the controllers are told, kg/m: they reckon half of each cable to its drone, half to the load. So
+    do plants whose cables have no mass; that of ``bead-cables`` is its own."""
     max_thrust: ThrustPerDrone | None = None
     """Largest steady thrust of a drone, all its rotors together, N."""
     motor_lag: LagPerDrone | None = None
@@ -487,7 +490,15 @@ class Frame(Section):
 
     @property
     def team(self) -> Team:
-        """The drones, cables and load as arrays."""
+        """The drones, cables and load as arrays, with the cables' mass at their ends."""
+        return self._roped(self._bare)
+
+    def _roped(self, bare: Team) -> Team:
+        density = self.drones.cable_density
+        return bare.with_ropes(density) if density > 0.0 else bare
+
+    @property
+    def _bare(self) -> Team:
         n, drones = self.drones.count, self.drones
         return Team.of_bodies(
             drones.numbers(),
@@ -506,7 +517,12 @@ class Frame(Section):
     @property
     def true_team(self) -> Team:
         """The bodies as they are; :attr:`team` is what the controllers are told."""
-        told, truth = self.team, self.truth
+        return self._roped(self.true_bodies)
+
+    @property
+    def true_bodies(self) -> Team:
+        """The same, without the cables' mass."""
+        told, truth = self._bare, self.truth
         return replace(
             told,
             load_mass=told.load_mass * truth.load_mass_factor,

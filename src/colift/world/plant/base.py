@@ -63,8 +63,14 @@ class PlantPart(Part):
     observe: ClassVar[Callable[..., Any]]
     reels: ClassVar[str] = "its cables keep their lengths"
     """Why winches cannot pay out its cables and take them in; empty where they can."""
+    roped: ClassVar[bool] = False
+    """Whether its cables have mass of their own; otherwise half of each cable's is its drone's and half the load's."""
     slackens: ClassVar[bool] = True
     """Whether its cables can go slack, and so be slack at the start."""
+
+    def team_of(self, bodies: Team, density: float) -> Team:
+        """The team that it is bound to, of bodies without and cables with this mass per length, kg/m."""
+        return bodies if self.roped or density == 0.0 else bodies.with_ropes(density)
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
         """Memory vector for the start state."""
