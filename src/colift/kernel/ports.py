@@ -225,7 +225,7 @@ PORTS: dict[str, Port] = {
         Port("sensing", sees=(*_TRUE.split(), "stuck")),
         Port(
             "estimation",
-            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", "reeled", *_RECEIVED),
+            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", "reeled", "found_lengths", *_RECEIVED),
         ),
         Port(
             "supervision",
@@ -249,7 +249,7 @@ PORTS: dict[str, Port] = {
             "observation",
             sees=(
                 *_named("estimated"), "estimated_ends", *_FELT, "thrusts", "standing",
-                "held_forces", *_RECEIVED,
+                "held_forces", "reeled", "lift_share", *_RECEIVED,
             ),
         ),
         Port(
@@ -257,6 +257,7 @@ PORTS: dict[str, Port] = {
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
                 "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses", "reeled",
+                "found_lengths",
                 *_RECEIVED,
             ),
         ),

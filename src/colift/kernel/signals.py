@@ -109,6 +109,7 @@ SIGNALS = (
     Signal("measured_specific_forces", ("n", 3), "m/s^2", "-", "body", "acceleration of each drone less gravity's, as its accelerometer measures it", writer="sensing"),
     Signal("specific_force_ages", ("n",), "s", "-", "-", "time since those samples were taken", writer="sensing"),
     Signal("reeled", ("n", 3), "m, m/s, m/s^2", "-", "-", "cable that each winch has paid out since the start, with two derivatives"),
+    Signal("found_lengths", ("n",), "m", "-", "-", "by how much each cable is found to be longer than is told", writer="observation"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 

@@ -12,11 +12,11 @@ _TRUST = 1e-3
 
 
 @inline
-def load_from_drones(n, drones, width, memory, lengths, apart, params, reeled, guess):  # type: ignore[no-untyped-def]
+def load_from_drones(n, drones, width, memory, lengths, apart, params, reeled, found, guess):  # type: ignore[no-untyped-def]
     """Position and velocity of the load that fit taut cables best (least squares); ``guess`` fills gaps.
 
     Drone i's position and velocity stand at ``memory[drones + width * i]``, its cable's length at
-    ``params[lengths + apart * i]``, to which ``reeled`` adds. Two Gauss-Newton steps on ``|p - x_i| = L_i``; then
+    ``params[lengths + apart * i]``, to which ``reeled`` and ``found`` add. Two Gauss-Newton steps on ``|p - x_i| = L_i``; then
     ``alpha_i . (v - v_i) = L_i'``, which rigid cables impose.
     """
     px, py, pz, vx, vy, vz = guess
@@ -30,7 +30,7 @@ def load_from_drones(n, drones, width, memory, lengths, apart, params, reeled, g
             scale = 1.0 / max(d, 1e-6)
             ax, ay, az = ax * scale, ay * scale, az * scale
             if sweep < 2:
-                r = params[lengths + apart * i] + reeled[i, 0] - d
+                r = params[lengths + apart * i] + reeled[i, 0] + found[i] - d
             else:
                 r = (
                     ax * (memory[o + 3] - vx)
