@@ -2,7 +2,7 @@
 """Set colift up in a virtual environment of its own, then fly, test or run a command.
 
     python3 bootstrap.py run  [ARGUMENT ...]     set up, then: colift run ARGUMENT ...
-    python3 bootstrap.py test [ARGUMENT ...]     set up with the test tools, then: pytest ARGUMENT ...
+    python3 bootstrap.py test [ARGUMENT ...]     set up with the test tools, then: pytest ARGUMENT ..., on all cores
     python3 bootstrap.py check                   set up with all tools: lint, types, docs, benchmark
     python3 bootstrap.py COMMAND [ARGUMENT ...]  set up, then: colift COMMAND ARGUMENT ...
 
@@ -17,6 +17,8 @@ import os
 import subprocess
 import sys
 import venv
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -24,13 +26,19 @@ ENVIRONMENT = ROOT / ".venv"
 BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 SUPPORTED = ((3, 11), (3, 13))
 CHECKS = (
-    ("ruff", "check", "."),
-    ("ruff", "format", "--check", "."),
-    ("mypy",),
-    ("lint-imports",),
-    ("sphinx-build", "-W", "--keep-going", "-q", "-b", "html", "docs", "docs/_build/html"),
-    ("colift", "bench", "--quick"),
+    (
+        ("ruff", "check", "."),
+        ("ruff", "format", "--check", "."),
+        ("mypy",),
+        ("lint-imports",),
+    ),
+    (
+        ("colift", "compile"),
+        ("sphinx-build", "-W", "--keep-going", "-q", "-b", "html", "docs", "docs/_build/html"),
+        ("colift", "bench", "--quick"),
+    ),
 )
+"""What is checked, in rows that go on side by side."""
 
 
 def set_up(lock: str) -> None:
@@ -65,6 +73,20 @@ def execute(command: list[str]) -> None:
         sys.exit(code)
 
 
+def check(row: Sequence[Sequence[str]]) -> list[str]:
+    """Run commands one after the other, print what each says when it ends, and return those that failed."""
+    failed = []
+    for name, *options in row:
+        done = subprocess.run(
+            [BIN / name, *options], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        command = f"{name} {' '.join(options)}".strip()
+        print(f"== {command}\n{done.stdout.decode(errors='replace')}", end="", flush=True)
+        if done.returncode:
+            failed.append(command)
+    return failed
+
+
 def main() -> None:
     """Do what the first argument says."""
     arguments = sys.argv[1:] or ["run"]
@@ -74,11 +96,13 @@ def main() -> None:
     task, rest = arguments[0], arguments[1:]
     set_up("requirements-dev.lock" if task in {"test", "check"} else "requirements.lock")
     if task == "test":
-        execute([str(BIN / "python"), "-m", "pytest", *rest])
+        chosen = any(each.startswith(("-n", "--numprocesses")) for each in rest)
+        workers = [] if chosen else ["-n", "auto", "--dist", "worksteal"]
+        execute([str(BIN / "python"), "-m", "pytest", *workers, *rest])
     elif task == "check":
-        for name, *options in CHECKS:
-            print(f"== {name} {' '.join(options)}", flush=True)
-            execute([str(BIN / name), *options])
+        with ThreadPoolExecutor() as pool:
+            if failed := [found for row in pool.map(check, CHECKS) for found in row]:
+                sys.exit(f"failed: {', '.join(failed)}")
     else:
         execute([str(BIN / "colift"), task, *rest])
 

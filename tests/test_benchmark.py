@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -18,6 +16,7 @@ from colift.study.bench import instructions, problems, solvers, tables, timing
 from colift.study.bench.problems import Problem
 from colift.study.bench.referee import TOLERANCES, judge
 from colift.team.scaling import scaled_load, scaled_mu
+from terminal import colift
 
 SIZES = (2, 3, 4, 16)
 
@@ -193,10 +192,8 @@ def test_a_solver_leaves_the_race_when_its_budget_is_spent(monkeypatch) -> None:
 @pytest.fixture(scope="module")
 def quick():
     pytest.importorskip("scipy")
-    done = subprocess.run(
-        [sys.executable, "-m", "colift", "bench", "--quick", "--sizes", "2,4", "--json"],
-        capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
+    done = colift("bench", "--quick", "--sizes", "2,4", "--json")
+    assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
@@ -300,9 +297,6 @@ def test_a_solver_that_grows_too_slow_is_left_out_with_the_reason() -> None:
 
 @pytest.mark.parametrize("sizes", ["1,4", "four", "2000"])
 def test_sizes_that_cannot_be_are_refused(sizes) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "colift", "bench", "--sizes", sizes],
-        capture_output=True, text=True, timeout=100, check=False,
-    )  # fmt: skip
+    done = colift("bench", "--sizes", sizes)
     assert done.returncode == 2
     assert "number" in done.stderr

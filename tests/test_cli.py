@@ -13,24 +13,16 @@ from pathlib import Path
 import pytest
 
 from colift.record.recording import Recording
+from terminal import colift
 
 SHORT = ("--set", "timing.duration=1.0", "--no-report")
 
 
-def colift(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "colift", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        timeout=300,
-        check=False,
-    )
-
-
 def test_run_as_json_prints_one_object_and_nothing_else(tmp_path: Path) -> None:
-    done = colift("run", "--json", "--out", str(tmp_path / "flight"))
+    command = [sys.executable, "-m", "colift", "run", "--json", "--out", str(tmp_path / "flight")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
+    assert colift("run", "--json", "--out", str(tmp_path / "again")).returncode == 0
     result = json.loads(done.stdout)
     assert result["outcome"] == "completed"
     assert result["metrics"]["tracking_rms_m"] <= 5e-4

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from terminal import colift
+
 SHORT = ("--set", "timing.duration=2")
 
 
-def colift(
-    *arguments: str, before: Callable[[], None] | None = None, stdout: int | None = None
-) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "colift", *arguments], stdout=stdout or subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, timeout=600, check=False, preexec_fn=before,
-    )  # fmt: skip
-
-
-def no_room() -> None:
-    """Writing more than 40 kB into a file fails, as on a full disk."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+NO_ROOM = 40_000
+"""Writing more bytes than these into a file fails, as on a full disk."""
 
 
 def one_line(done: subprocess.CompletedProcess[str]) -> str:
@@ -46,12 +36,12 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.mark.usefixtures("compiled")
 def test_without_room_the_flight_is_told_all_the_same(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = colift("run", "hover", *SHORT, "--out", str(out), before=no_room)
+    done = colift("run", "hover", *SHORT, "--out", str(out), largest_file=NO_ROOM)
     assert one_line(done) == f"error: {out}/recording.h5: File too large"
     assert "tracking_max_m" in done.stdout
     assert "Pass" in done.stdout
     assert list(out.iterdir()) == []
-    done = colift("run", "hover", *SHORT, "--out", str(out), "--json", before=no_room)
+    done = colift("run", "hover", *SHORT, "--out", str(out), "--json", largest_file=NO_ROOM)
     assert one_line(done).endswith("recording.h5: File too large")
     told = json.loads(done.stdout)
     assert told["verdict"]["level"] == "pass"
@@ -81,7 +71,7 @@ def test_an_earlier_run_survives_a_later_one_without_room(tmp_path: Path) -> Non
     assert colift("run", "hover", *SHORT, "--out", str(out), "--no-report").returncode == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     assert set(before) == {"recording.h5", "metrics.json", "mission.toml"}
-    assert colift("run", "hover", *SHORT, "--out", str(out), before=no_room).returncode == 1
+    assert colift("run", "hover", *SHORT, "--out", str(out), largest_file=NO_ROOM).returncode == 1
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import colift
+import terminal
 from colift.control.allocation.base import Status
 from colift.errors import ColiftError, MissionError
 from colift.record.recording import Recording
@@ -174,17 +173,15 @@ def test_the_page_holds_every_flight_once(flight: Recording, tmp_path: Path) -> 
 @pytest.mark.slow
 def test_the_command_prints_one_object(flight: Recording, tmp_path: Path) -> None:
     file = flight.save(tmp_path / "flight.h5")
-    command = [sys.executable, "-m", "colift", "judge", str(file), "--allocators", "safe,ring"]
+    command = ["judge", str(file), "--allocators", "safe,ring"]
     command += ["--set", "safe.min_angle_deg=40", "--out", str(tmp_path / "out"), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = terminal.colift(*command)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     rows = {row["allocator"]: row for row in result["flights"][0]["rows"]}
     assert rows["safe"]["settings"]["min_angle_deg"] == 40.0
     assert rows["safe"]["min_angle_deg"] >= 40.0
     assert all(Path(path).is_file() for path in result["files"].values())
-    wrong = subprocess.run(
-        [*command[:5], "--allocators", "saef"], capture_output=True, text=True, timeout=300, check=False
-    )  # fmt: skip
+    wrong = terminal.colift(*command[:2], "--allocators", "saef")
     assert wrong.returncode == 2
     assert "did you mean 'safe'?" in wrong.stderr

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import colift
+import terminal
 from colift.control.allocation.sqp import Sqp
 from colift.kernel.status import Status
 from colift.mission import mission_names
@@ -107,24 +106,18 @@ def test_the_verdict_names_every_fault() -> None:
 
 @pytest.mark.slow
 def test_commands_print_one_object_and_tell_by_exit_code() -> None:
-    def colift(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "colift", *arguments],
-            capture_output=True, text=True, check=False, timeout=300,
-        )  # fmt: skip
-
-    good = colift("feasibility", "hover", "--json")
+    good = terminal.colift("feasibility", "hover", "--json")
     assert good.returncode == 0
     found = json.loads(good.stdout)
     assert found["feasible"]
     assert found["lightest_N"] < found["weight_N"] < found["heaviest_N"]
-    heavy = colift("feasibility", "hover", "--set", "load.mass=3.0")
+    heavy = terminal.colift("feasibility", "hover", "--set", "load.mass=3.0")
     assert heavy.returncode != 0
     assert "tension_max" in heavy.stderr + heavy.stdout
-    none = colift("feasibility", "paper-spiral")
+    none = terminal.colift("feasibility", "paper-spiral")
     assert none.returncode == 1
     assert "allocation.kind=safe" in none.stderr
-    shown = colift("safety", "--sizes", "4", "--cycles", "1000", "--quick", "--json")
+    shown = terminal.colift("safety", "--sizes", "4", "--cycles", "1000", "--quick", "--json")
     assert shown.returncode == 0, shown.stderr
     result = json.loads(shown.stdout)
     assert len(result["attacks"]) == 2 * len(safety.FAMILIES)

@@ -6,7 +6,6 @@ import importlib.util
 import json
 import math
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from colift.errors import ColiftError, MissionError
 from colift.mission import load_mission
 from colift.study import size as study
 from colift.team import Team
+from terminal import colift
 
 G = 9.81
 
@@ -29,12 +29,7 @@ def question(
 
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "colift", "size", *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return colift("size", *arguments)
 
 
 THREE = ("--mass", "1.4", "--max-thrust", "28", "--cable", "2")

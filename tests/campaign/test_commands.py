@@ -15,17 +15,13 @@ from pathlib import Path
 import pytest
 
 from colift.study.campaign.store import Store
+from terminal import colift
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "my_allocator.py"
-SHORT = ("--set", "timing.duration=0.3", "--set", "criteria.max_tilt_deg.max=180")
-"""A start out of balance, and the paper's gains, turn a drone over at once."""
-
-
-def colift(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "colift", *arguments],
-        capture_output=True, text=True, check=False, cwd=folder, timeout=300,
-    )  # fmt: skip
+SHORT = (
+    "--workers", "1", "--set", "timing.duration=0.3", "--set", "criteria.max_tilt_deg.max=180",
+)  # fmt: skip
+"""A start out of balance, and the paper's gains, turn a drone over at once; a worker takes longer to start than to fly."""
 
 
 class Images(HTMLParser):

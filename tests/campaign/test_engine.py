@@ -20,6 +20,7 @@ from colift.record.recording import Recording
 from colift.study.campaign.engine import Estimate, Options, Progress
 from colift.study.campaign.plan import Source, plan
 from colift.study.campaign.store import Store
+from terminal import colift
 
 Write = Callable[[str], Path]
 
@@ -133,7 +134,7 @@ def test_killed_half_way_it_goes_on_and_counts_nothing_twice(
     for pid in {int(row["worker"].rpartition(":")[2]) for row in before.values()}:
         wait_for(lambda pid=pid: gone(pid))  # workers notice and leave no orphan
 
-    done = subprocess.run(sweep(folder, slow), capture_output=True, text=True, check=False)
+    done = colift(*sweep(folder, slow)[3:])
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["flown"] == 12 - len(before)
     after = rows_of(file)

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import colift
+import terminal
 from colift.errors import ColiftError, MissionError, UnknownNameError
 from colift.mission import load_mission
 from colift.show.report.stress import COLUMNS, SHARES, matrix_tables, write_stress
@@ -222,32 +223,36 @@ def test_cells_tell_lost_missed_and_held_apart():
     assert nothing == ["wind", "0/2 (0-85 %)", "2", "-", "-", "-"]
 
 
-def command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "colift", "stress", "--conditions", "calm;delay", *arguments]
+STRESS = ("stress", "--conditions", "calm;delay")
 
 
 def test_the_command_prints_json_and_is_strict_when_asked(tmp_path: Path) -> None:
     options = ["--seeds", "1", "--set", "timing.duration=1.0", "--out", str(tmp_path), "--json"]
-    done = subprocess.run(command(*options), capture_output=True, text=True, check=True)
-    told = json.loads(done.stdout)
+    told = json.loads(terminal.colift(*STRESS, *options, check=True).stdout)
     assert (told["passed"], told["flights"]) == (2, 2)
     assert Path(told["files"]["report"]).is_file()
-    hard = [*options, "--strict", "--set", "criteria.min_angle_deg.min=89.0"]
-    done = subprocess.run(command(*hard), capture_output=True, text=True, check=False)
+    hard = [*options, "--workers", "1", "--strict", "--set", "criteria.min_angle_deg.min=89.0"]
+    done = terminal.colift(*STRESS, *hard)
     assert done.returncode == 4
     told = json.loads(done.stdout)
     assert [each["level"] for each in told["failing"]] == ["fail", "fail"]
     assert told["conditions"]["calm"][0]["interval"] == pytest.approx([0.0, 0.975])
     lax = [word for word in hard if word != "--strict"]
-    assert subprocess.run(command(*lax), capture_output=True, check=False).returncode == 0
+    assert terminal.colift(*STRESS, *lax).returncode == 0
 
 
 def test_seeds_begin_where_they_are_told_to(tmp_path: Path) -> None:
-    options = ["--seeds", "2", "--first-seed", "1000", "--set", "timing.duration=0.1"]
-    done = subprocess.run(
-        command(*options, "--out", str(tmp_path), "--json"),
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+    options = [
+        "--seeds",
+        "2",
+        "--first-seed",
+        "1000",
+        "--workers",
+        "1",
+        "--set",
+        "timing.duration=0.1",
+    ]
+    done = terminal.colift(*STRESS, *options, "--out", str(tmp_path), "--json", check=True)
     assert json.loads(done.stdout)["seeds"] == [1000, 1001]
     with Store(tmp_path / "campaign.sqlite") as store:
         assert {row["seed"] for row in store.rows()} == {1000, 1001}
@@ -264,7 +269,10 @@ def test_nothing_is_lost_when_it_is_killed_half_way(tmp_path: Path) -> None:
         with Store(file) as store:
             return len(store.finished())
 
-    process = subprocess.Popen(command(*options), stdout=subprocess.DEVNULL, start_new_session=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "colift", *STRESS, *options], stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    )  # fmt: skip
     deadline = time.monotonic() + 120.0
     while finished() < 3:
         assert process.poll() is None, "it ended before it could be killed"
@@ -274,7 +282,6 @@ def test_nothing_is_lost_when_it_is_killed_half_way(tmp_path: Path) -> None:
     process.wait()
     there = finished()
     assert there >= 3
-    done = subprocess.run(command(*options), capture_output=True, text=True, check=True)
-    told = json.loads(done.stdout)
+    told = json.loads(terminal.colift(*STRESS, *options, check=True).stdout)
     assert told["flights"] == 12
     assert told["flown"] == 12 - there

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -23,15 +21,9 @@ from colift.record.importing._clocks import merge
 from colift.record.importing.base import DRONE_COLUMNS, Log
 from colift.record.recording import Recording
 from colift.show.report import figures, html
+from terminal import colift
 
 TIME = np.arange(600) * 0.01
-
-
-def colift(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "colift", *arguments],
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
 
 
 def test_logs_of_several_drones_are_put_together(tmp_path: Path) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 import colift
+import terminal
 from colift.errors import MissionError
 from colift.mission import load_mission
 
@@ -70,11 +69,9 @@ def test_mistakes_are_told_before_the_flight(criteria, message):
 
 @pytest.mark.parametrize(("limit", "code"), [(0.5, 0), (1e-9, 4)])
 def test_the_command_ends_with_the_verdict(tmp_path, limit, code):
-    command = [sys.executable, "-m", "colift", "run", "hover", "--no-report", "--json"]
+    command = ["run", "hover", "--no-report", "--json"]
     sets = ["--set", "timing.duration=0.3", "--set", f"criteria.tracking_max_m.max={limit}"]
-    done = subprocess.run(
-        [*command, *sets, "--out", str(tmp_path)], capture_output=True, text=True, check=False
-    )
+    done = terminal.colift(*command, *sets, "--out", str(tmp_path))
     assert done.returncode == code, done.stderr
     said = json.loads(done.stdout)
     assert {each["metric"]: each["holds"] for each in said["criteria"]}["tracking_max_m"] is (

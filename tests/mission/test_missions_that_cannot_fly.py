@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,6 +12,7 @@ from colift.control.allocation.limits.hover import RESERVE
 from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
+from terminal import colift
 
 WEAK = {
     "name": "weak-motors",
@@ -99,13 +98,6 @@ def test_a_load_beyond_the_cables_names_what_binds():
         load_mission("hover", heavy)
     load_mission("hover", {"load.mass": 1.88})
     assert load_mission("hover", heavy, must_fly=False).load.mass == 1.95
-
-
-def colift(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "colift", *arguments],
-        capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
 
 
 def test_the_commands_refuse_and_judge(tmp_path):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from itertools import permutations
 
 import pytest
 
 import colift
+import terminal
 from colift.mission.load import layered, load_mission, parse_overrides
 from colift.part import LAYERS, LISTS, find, names
 from colift.study import compare, stress, sweep
@@ -171,9 +170,7 @@ def test_so_does_every_command(tmp_path):
         ],
     }
     for name, words in commands.items():
-        done = subprocess.run(
-            [sys.executable, "-m", "colift", *words], capture_output=True, text=True, check=False
-        )
+        done = terminal.colift(*words)
         assert json.loads(done.stdout), name
     assert 'kind = "motors"' in (tmp_path / "run" / "mission.toml").read_text()
     with closing(sqlite3.connect(tmp_path / "stress" / "campaign.sqlite")) as database:

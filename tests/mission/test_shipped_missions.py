@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +28,14 @@ def plain(value):
 def test_the_papers_mission_is_shipped():
     assert {"paper-spiral", "hover", "figure-eight", "point-to-point", "payload-step"} <= set(NAMES)
     assert all(a < b for a, b in pairwise(NAMES))
+
+
+def test_the_catalogue_of_tasks_names_missions_that_are_shipped():
+    page = Path(colift.__file__).parents[2] / "docs" / "tasks.md"
+    rows = [line.split("|") for line in page.read_text().splitlines() if line.startswith("| ")]
+    named = set(re.findall("`([a-z0-9-]+)`", " ".join(row[2] for row in rows)))
+    assert named <= set(NAMES)
+    assert len(named) >= 15
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 import colift
+import terminal
 from colift.control.tuning import loop_growth
 from colift.flight.flight import Flight
 from colift.mission import load_mission, mission_names
@@ -185,10 +184,9 @@ def test_warnings_go_with_the_flight(tmp_path):
     assert "drag" in text
     saved = colift.Recording.load(run.recording.save(tmp_path / "r.h5"))
     assert saved.provenance["warnings"] == [text]
-    shown = subprocess.run(
-        [sys.executable, "-m", "colift", "run", "windy-spiral", "--set", "timing.duration=0.2", "--set",
-         'disturbance=[{kind="wind"}]', "--json", "--out", str(tmp_path / "out")],
-        capture_output=True, text=True, check=False, timeout=300,
+    shown = terminal.colift(
+        "run", "windy-spiral", "--set", "timing.duration=0.2", "--set",
+        'disturbance=[{kind="wind"}]', "--json", "--out", str(tmp_path / "out"),
     )  # fmt: skip
     assert json.loads(shown.stdout)["warnings"] == [text.replace("disturbance.1", "disturbance.0")]
     assert "warning: disturbance.0.kind" in shown.stderr

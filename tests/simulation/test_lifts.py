@@ -46,6 +46,7 @@ def check(run, order=ALL, *, peak=1.0, down=1.5, dragged=5e-3, placed=0.01, mass
     assert found["weighed_mass_kg"] == pytest.approx(run.mission.true_team.load_mass, rel=mass)
     assert found["slack_time_s"] <= 0.1
     assert found["lost_drones"] == 0.0
+    assert found["setbacks"] == 0.0
     return run
 
 
@@ -155,6 +156,26 @@ def test_late_and_noisy_sensors_and_a_push_of_a_twentieth_of_the_weight():
     check(run, dragged=8e-3)
 
 
+GUSTS = [
+    {"kind": "gust", "peak": [5.0, 0.0, 1.5], "at": 0.0, "duration": 2.0, "every": 3.0},
+    {"kind": "gust", "peak": [0.0, 5.0, -1.5], "at": 0.0, "duration": 1.0, "every": 2.0},
+    {"kind": "drag", "drone_area": 0.0, "load_area": 0.0, "cable_diameter": 0.0, "drone_linear": 0.049, "load_linear": 0.022},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_gusts_of_a_twentieth_of_the_weight_are_neither_tension_nor_a_cut_cable(seed):
+    bounds = {f"criteria__{name}": {"max": 2.0} for name in ("lift_peak", "touch_peak")}
+    run = fly(disturbance=GUSTS, seed=seed, **SHORT, **bounds)
+    check(run, peak=2.0, down=2.0, dragged=0.03, mass=0.15)
+    r, L = run.recording, 1.0
+    raised = np.flatnonzero((r["phase"][:, 0] == Phase.TENSION) & (r["load"][:, 0, 2] < 1e-3))
+    distances = np.linalg.norm(r["positions"] - r["load"][:, None, 0], axis=2)
+    assert (
+        distances[raised].min() > 0.99 * L
+    )  # all cables were at their ends before they were told to pull
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", ["elastic-cables", "bead-cables"])
 def test_cables_that_stretch(plant):
@@ -163,11 +184,9 @@ def test_cables_that_stretch(plant):
 
 @pytest.mark.slow
 def test_on_the_plant_of_others():
-    """Its cables are so stiff that a step decides the peak of a catch; what plants agree on is the impulse."""
+    """Its cables are springs with critical damping, whose force is there at once: what counts is the speed of a catch."""
     pytest.importorskip("mujoco")
-    free = {f"criteria__{name}": {"max": 3.0} for name in ("lift_peak", "touch_peak")}
-    run = fly(plant__kind="mujoco", **{**SHORT, "timing.duration": 33.0}, **free)
-    check(run, peak=3.0, down=3.0)
+    run = check(fly(plant__kind="mujoco", **{**SHORT, "timing.duration": 36.0}))
     assert run.metrics["max_catch_impulse_Ns"] < 0.5 * 0.03  # a drone caught at 3 cm/s
 
 
@@ -183,6 +202,7 @@ def test_a_load_that_cannot_be_lifted_is_given_up_and_the_drones_land(changes):
     assert run.recording["load"][:, 0, 2].max() < 5e-3
     assert run.metrics["drone_touch_speed_mps"] <= 0.15
     assert np.isnan(run.metrics["weighed_mass_kg"])
+    assert run.metrics["setbacks"] == 1.0
 
 
 def test_a_flight_that_begins_in_the_air_ends_on_the_ground():

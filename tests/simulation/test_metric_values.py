@@ -118,6 +118,7 @@ EXPECTED = {
     "touch_height_m": 3.0,
     "placement_m": 0.03,
     "weighed_mass_kg": 0.2,
+    "setbacks": 0.0,
     "lost_drones": 1.0,
     "detection_delay_s": 0.12,
     "allocator_failures": 2.0,

@@ -29,17 +29,11 @@ from colift.record.verdict import judge
 from colift.show.report.figures import drawable
 from colift.show.report.html import write_report
 from colift.show.viewer.data import payload
+from terminal import colift
 
 KEPT = Path(__file__).parents[1] / "data" / "format-1.h5"
 
 Change = Callable[[Any], None]
-
-
-def colift(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "colift", *arguments],
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
 
 
 @pytest.fixture

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import colift
+import terminal
 from colift.mission import load_mission
 from colift.record import metrics, verdict
 from colift.record.verdict import criteria_of, judge, limits
@@ -139,8 +138,7 @@ def test_defaults_that_do_not_apply_are_left_out(flight):
 
 
 def command(tmp_path, *arguments):
-    full = [sys.executable, "-m", "colift", *arguments]
-    return subprocess.run(full, capture_output=True, text=True, check=False, cwd=tmp_path)
+    return terminal.colift(*arguments, folder=tmp_path)
 
 
 def test_a_released_load_is_lost_everywhere(tmp_path):

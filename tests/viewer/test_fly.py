@@ -20,6 +20,9 @@ from colift.show.live.server import Server
 from colift.show.live.session import Session
 from colift.team.geometry import pairwise_angles
 
+SMALL = (700, 420)
+"""Every frame is drawn in software: a second page waits until the first one's frames leave it some time."""
+
 
 class Flying:
     """A session in the air behind its server, both in threads of their own."""
@@ -87,7 +90,7 @@ def turn(opened: Opened, name: str, value: float) -> None:
 
 
 def test_a_person_flies(flying: Flying, open_url: Open) -> None:
-    opened = open_url(flying.server.url, size=(1300, 800))
+    opened = open_url(flying.server.url, size=SMALL)
     opened.wait("colift.state().flights[0].rows > 10")
     assert opened.page.locator(".role").inner_text() == "you steer"
 
@@ -110,7 +113,7 @@ def test_a_person_flies(flying: Flying, open_url: Open) -> None:
     flying.wait(opened, spread)
 
     # Another page may watch, with or without the token, and cannot steer.
-    other = open_url(flying.server.url, size=(900, 600))
+    other = open_url(flying.server.url, size=SMALL)
     other.wait("colift.state().flights[0].rows > 10")  # it was told the past
     assert other.page.locator(".role").inner_text() == "watching"
     assert other.page.locator("[title='Cut cable 3']").is_disabled()

@@ -35,6 +35,7 @@ config: Any = numba.config
 F = TypeVar("F", bound=Callable[..., Any])
 
 JIT_ENABLED: bool = not bool(config.DISABLE_JIT)
+PACKAGE = Path(__file__).parents[1]
 
 f8 = types.float64
 i8 = types.int64
@@ -138,6 +139,17 @@ def splice(function: F) -> F:
 _one_at_a_time = threading.RLock()  # for Numba's setting, which is the whole process's
 
 
+class _Locator(caching.UserProvidedCacheLocator):
+    """Where in the cache a kernel is: for all copies of colift the same place, as all with these sources compile the same."""
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        folder = Path(py_file).parent
+        if folder.is_relative_to(PACKAGE):
+            return "-".join(folder.relative_to(PACKAGE.parent).parts)
+        return str(super().get_suitable_cache_subpath(py_file))  # type: ignore[no-untyped-call]
+
+
 class _Kept(caching.CompileResultCacheImpl):
     """What the cache keeps of a kernel, so that it is loaded without what only compiling needs: a fifth of a second a run.
 
@@ -145,6 +157,8 @@ class _Kept(caching.CompileResultCacheImpl):
     same names serves until then. Environments of Numba's own helpers are left out, as each would import a module of
     Numba's: they serve to build an exception at run time, and what Numba raises there is made when it compiles.
     """
+
+    _locator_classes = [_Locator, *caching.CompileResultCacheImpl._locator_classes]  # noqa: RUF012
 
     def reduce(self, cres: Any) -> Any:
         (name, kind, (code, bitcode)), *rest, environments = super().reduce(cres)  # type: ignore[no-untyped-call]
@@ -204,11 +218,10 @@ def _cache_for(function: Callable[..., Any]) -> Iterator[None]:
 @cache
 def cache_folder(folder: Path) -> Path:
     """Where the kernels of a source folder are cached; ``COLIFT_CACHE`` moves it."""
-    kernel = Path(__file__).parent
-    sources = list(kernel.rglob("*.py"))
-    if folder.is_relative_to(kernel.parent):  # the layer's folder, with those of its helpers
-        layer = folder.relative_to(kernel.parent).parts[:2]
-        sources += kernel.parent.joinpath(*layer).rglob("*.py")
+    sources = list((PACKAGE / "kernel").rglob("*.py"))
+    if folder.is_relative_to(PACKAGE):  # the layer's folder, with those of its helpers
+        layer = folder.relative_to(PACKAGE).parts[:2]
+        sources += PACKAGE.joinpath(*layer).rglob("*.py")
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(sources):
         digest.update(source.read_bytes())

@@ -48,6 +48,7 @@ METRICS = (
     Metric("touch_height_m", "m", "height of the load above the ground when its touch-down was told"),
     Metric("placement_m", "m", "distance in the level between where the load was set down and where it should be"),
     Metric("weighed_mass_kg", "kg", "mass of the load as weighed at lift-off"),
+    Metric("setbacks", "1", "how often a load was not lifted: hooked anew, or given up"),
     Metric("lost_drones", "1", "drones that left before the end"),
     Metric("detection_delay_s", "s", "longest time from a cut cable or dead motors to the drone's leaving the team"),
     Metric("allocator_failures", "1", "allocations that failed: not the best answer, and no limit to blame"),

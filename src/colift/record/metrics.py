@@ -356,6 +356,15 @@ def weighed_mass_kg(r: Recording) -> float:
     return float(weighed[-1]) if weighed[-1] > 0.0 else math.nan
 
 
+@_metric
+def setbacks(r: Recording) -> float:
+    phases = r["phase"][:, 0]
+    if (phases == Phase.FLY).all():
+        return math.nan
+    before = phases[:-1][(phases[1:] == Phase.UNLOAD) & (phases[:-1] != Phase.UNLOAD)]
+    return float(np.count_nonzero(before != Phase.TOUCH))
+
+
 def _has_ground(r: Recording) -> bool:
     return r.mission.ground is not None
 

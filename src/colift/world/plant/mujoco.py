@@ -136,8 +136,10 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         model.tendon_range[:, 1] = lengths + wound @ _ahead(params)
         middle = [paid_out(sees.winches, i, at + 0.5 * dt / substeps) for i in range(n)]
         mujoco.mj_forward(model, data)
-        pressed = _contacts(scene, writes.ground_forces if substep == 0 else np.zeros((n + 1, 3)))
-        limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
+        pressed = _touching(scene, n)
+        if substep == 0:
+            _press(scene, writes.ground_forces)
+        limits = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
         pulls = np.zeros(n)
         pulls[data.efc_id[limits]] = data.efc_force[limits]
         if substep == 0:
@@ -153,7 +155,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if model.ngeom:
             np.maximum(
                 writes.touch_speeds, sinking, out=writes.touch_speeds,
-                where=~pressed & _contacts(scene, np.zeros((n + 1, 3))),
+                where=~pressed & _touching(scene, n),
             )  # fmt: skip
     state[scene.qpos] = data.qpos
     state[scene.qvel] = data.qvel
@@ -174,18 +176,29 @@ def _ahead(params: Vector) -> Vector:
     return np.array([1.0, 2.0 * scale, impedance * time_constant * scale])
 
 
-def _contacts(scene: _Scene, forces: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which of drones and, last, load (n + 1,) touch the ground now; fills its forces on them (n + 1, 3), N."""
+def _touching(scene: _Scene, n: int) -> NDArray[np.bool_]:
+    """Which of drones and, last, load (n + 1,) touch the ground now."""
+    touching = np.zeros(n + 1, dtype=bool)
+    if scene.data.ncon:
+        contacts = scene.data.contact
+        touching[scene.body[contacts.geom2[contacts.dist < 0.0]]] = True
+    return touching
+
+
+def _press(scene: _Scene, forces: NDArray[np.float64]) -> None:
+    """Fill the forces (n + 1, 3) of the ground on drones and, last, load, N."""
     import mujoco
 
-    forces[:], touching = 0.0, np.zeros(len(forces), dtype=bool)
-    for k, contact in enumerate(scene.data.contact):
-        body = scene.body[contact.geom2]
-        force = np.zeros(6)
-        mujoco.mj_contactForce(scene.model, scene.data, k, force)
-        forces[body] += force[:3] @ contact.frame.reshape(3, 3)
-        touching[body] |= contact.dist < 0.0
-    return touching
+    forces[:] = 0.0
+    if scene.data.ncon:
+        contacts, force = (
+            scene.data.contact,
+            np.zeros(6),
+        )  # of all a field at once: one contact costs as much
+        frames, bodies = contacts.frame.reshape(-1, 3, 3), scene.body[contacts.geom2]
+        for k, body in enumerate(bodies):
+            mujoco.mj_contactForce(scene.model, scene.data, k, force)
+            forces[body] += force[:3] @ frames[k]
 
 
 class Mujoco(BodiesPart):
