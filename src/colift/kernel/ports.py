@@ -231,7 +231,7 @@ PORTS: dict[str, Port] = {
             "supervision",
             sees=(
                 *_named("estimated"), "estimated_ends", "estimated_forces", "estimated_wind", "thrusts",
-                "reference", "reeled", *_RECEIVED,
+                "reference", "reeled", "found_lengths", *_RECEIVED,
             ),
         ),
         Port("reference", sees=()),

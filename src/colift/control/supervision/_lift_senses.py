@@ -28,8 +28,8 @@ def span_of(i, sees):  # type: ignore[no-untyped-def]
 
 @inline
 def length(i, sees, params):  # type: ignore[no-untyped-def]
-    """Length of cable i as it is wound out, m."""
-    return params[P.rows + P.width * i + P.L] + sees.reeled[i, 0]
+    """Length of cable i as it is wound out and has been found in flight, m: that from which spans are counted."""
+    return params[P.rows + P.width * i + P.L] + sees.reeled[i, 0] + sees.found_lengths[i]
 
 
 @inline
