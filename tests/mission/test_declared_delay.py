@@ -9,7 +9,10 @@ from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.part import LAYERS, find, names
 
-TRUE = {f"sensing.{sensor}_delay" for sensor in ("load", "tracking", "attitude", "rates")}
+TRUE = {
+    f"sensing.{sensor}_delay"
+    for sensor in ("load", "tracking", "attitude", "rates", "specific_force")
+}
 TOLD = {f"{layer}.delay" for layer in ("estimation", "load_control", "observation", "position_control", "attitude_control")}  # fmt: skip
 ALL = {*TRUE, *TOLD, "estimation.attitude_delay"}
 

@@ -131,7 +131,9 @@ def test_the_papers_drone_is_the_default():
 def test_what_is_not_told_is_usual_and_shown_as_derived():
     plain = mission()
     assert plain.drones.vehicle is None
-    assert set(plain.resolved()["drones"]) == {"count", "mass", "inertia", "cable_length"}
+    assert set(plain.resolved()["drones"]) == {
+        "count", "mass", "inertia", "cable_length", "cable_density",
+    }  # fmt: skip
     motors, safe = plain.actuation, plain.allocation
     assert (motors.max_thrust, motors.time_constant, motors.arm_length) == (3.0, 0.02, 0.2)
     assert (motors.torque_ratio, motors.max_rate, motors.noise) == (0.016, 100.0, 0.01)

@@ -47,6 +47,7 @@ class Rig:
         self.external, self.attached = np.zeros((n + 1, 3)), np.ones(n)
         self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
         self.peak_tensions, self.catch_impulses = np.zeros(n + 1), np.zeros(n)
+        self.winches, self.time = np.zeros((n, 4)), 0.0
         self.ground_forces, self.touch_speeds = np.zeros((n + 1, 3)), np.zeros(n + 1)
 
     def straighten(self):
@@ -59,13 +60,14 @@ class Rig:
         port = PORTS["plant"]
         wire = port.wire(type(self.part).kernel, self.params, self.memory, self._signals())
         for _ in range(count):
-            port.invoke(wire, 0, 0.0, dt)
+            port.invoke(wire, 0, self.time, dt)
+            self.time += dt
         return self
 
     def _signals(self):
         return {
             "applied_thrusts": self.thrusts, "applied_torques": self.torques,
-            "external_forces": self.external, "attached": self.attached, "tensions": self.tensions,
+            "external_forces": self.external, "winches": self.winches, "attached": self.attached, "tensions": self.tensions,
             "peak_tensions": self.peak_tensions, "catch_impulses": self.catch_impulses,
             "slack_times": self.slack_times, "ground_forces": self.ground_forces,
             "touch_speeds": self.touch_speeds,

@@ -213,6 +213,30 @@ def test_a_flight_that_begins_in_the_air_ends_on_the_ground():
     assert run.metrics["placement_m"] <= 0.01
 
 
+def test_a_short_way_aside_is_no_jolt():
+    changes = {"start.on_ground": False, "supervision.kind": "lift", **SHORT}
+    run = colift.run("take-off-and-land", overrides={**changes, "supervision.set_down": [0.1, 0.0]})
+    assert run.metrics["placement_m"] <= 0.01
+    assert run.metrics["slack_time_s"] <= 0.1
+
+
+def test_lengths_found_in_flight_and_wound_meanwhile_are_counted_once():
+    """Cables measured in the air are hooked again, and taken in while the load is being lifted."""
+    wound = [{"at": 19.5, "field": "drones.cable_length", "value": 0.7, "rate": 0.4}]
+    changes = {
+        "start.on_ground": False, "supervision.kind": "lift", "truth.cable_length_factor": 1.05,
+        "supervision.set_down": [[0.0, 0.0], [0.0, 0.0]], "events": wound,
+    }  # fmt: skip
+    run = colift.run("take-off-and-land", overrides={**SHORT, **changes, "timing.duration": 24.2})
+    r = run.recording
+    again = (r["phase"][:, 0] == Phase.FLY) & (r.time > 1.0)
+    assert phases(run) == [Phase.FLY, *ALL[6:10], *ALL[2:6]]
+    assert run.metrics["setbacks"] == 0.0
+    np.testing.assert_allclose(r["found_lengths"][again], 0.05, atol=1e-3)
+    np.testing.assert_allclose(r["spans"][again, :, 0], 0.0, atol=2e-3)
+    np.testing.assert_allclose(r["reeled"][again, :, 0], -0.3, atol=1e-9)
+
+
 def test_a_reference_that_begins_on_the_ground_is_flown_above_it():
     points = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.5], [0.5, 0.0, 0.0]]
     reference = {"kind": "waypoints", "points": points, "travel": 3.0, "hold": 0.5}

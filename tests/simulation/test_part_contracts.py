@@ -56,7 +56,8 @@ def test_every_folder_has_a_part():
 
 def test_every_signal_has_one_writer_or_is_a_condition():
     assert {signal.writer for signal in (*HIDDEN, *SIGNALS)} == {*PORTS, ""}
-    assert tuple(signal.name for signal in SIGNALS if not signal.writer) == CONDITIONS
+    unwritten = [signal.name for signal in SIGNALS if not signal.writer]
+    assert unwritten == [*CONDITIONS, "reeled"]  # the loop writes what winches do
 
 
 @pytest.mark.parametrize(("layer", "name"), EVERY, ids=IDS)

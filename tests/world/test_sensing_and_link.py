@@ -17,6 +17,7 @@ from colift.world.sensing.noisy import Noisy
 QUIET = {
     "load_position_noise": 0.0, "load_velocity_noise": 0.0, "position_noise": 0.0,
     "velocity_noise": 0.0, "attitude_noise_deg": 0.0, "rates_noise": 0.0, "attitude_bias": 0.0,
+    "specific_force_noise": 0.0, "specific_force_bias": 0.0,
 }  # fmt: skip
 PROMPT = {
     f"{sensor}_{name}": value
@@ -120,6 +121,62 @@ def test_noise_has_its_size_is_white_and_differs_between_axes():
     for lag in (1, 2, 7):
         assert np.abs((z[lag:] * z[:-lag]).mean(axis=0)).max() < 4.5 / np.sqrt(len(x))
     assert np.abs(np.corrcoef(z.T) - np.eye(30)).max() < 5.0 / np.sqrt(len(x))
+
+
+class Falling(Sensors):
+    """Drones that fall freely but for what ``lift`` (3,) accelerates them, m/s^2, at an attitude; what accelerometers say."""
+
+    def feel(self, steps, lift, attitude=(1.0, 0.0, 0.0, 0.0)):
+        found = []
+        felt, ages = np.zeros((self.team.n, 3)), np.zeros(self.team.n)
+        self.truth[3][:] = attitude
+        for k in range(steps):
+            self.part.call(
+                self.team, self.memory, step=k, dt=self.dt, key=self.key, velocities=self.truth[2],
+                attitudes=self.truth[3], measured_specific_forces=felt, specific_force_ages=ages,
+            )  # fmt: skip
+            found.append((felt.copy(), ages.copy()))
+            self.truth[2] += self.dt * (np.asarray(lift) - [0.0, 0.0, self.team.gravity])
+        return [np.array(each) for each in zip(*found, strict=True)]
+
+
+@pytest.mark.parametrize("part", [Ideal(), Noisy(**QUIET)], ids=["ideal", "noisy"])
+def test_an_accelerometer_feels_all_but_gravity_in_the_body_frame(part):
+    felt, _ = Falling(part).feel(40, (0.0, 0.0, 0.0))
+    np.testing.assert_allclose(felt[20:], 0.0, atol=1e-12)
+    yawed = (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))  # by 90 degrees: the body's x is the world's y
+    felt, ages = Falling(part).feel(40, (1.0, 2.0, 12.0), yawed)
+    np.testing.assert_allclose(felt[20:], [[[2.0, -1.0, 12.0]] * 2] * 20, atol=1e-10)
+    assert ages.max() == pytest.approx(0.0 if isinstance(part, Ideal) else 0.006)
+
+
+def test_a_sample_is_the_mean_since_the_one_before_and_nothing_is_left_out():
+    """Samples times their periods are the change of the velocity, whatever happened between them."""
+    sensors = Falling(Noisy(**QUIET, specific_force_period=0.01, specific_force_delay=0.0))
+    rng, change = np.random.default_rng(5), np.zeros((2, 3))
+    felt, ages = np.zeros((2, 3)), np.zeros(2)
+    for k in range(101):
+        sensors.part.call(
+            sensors.team, sensors.memory, step=k, velocities=sensors.truth[2], dt=sensors.dt,
+            attitudes=sensors.truth[3], measured_specific_forces=felt, specific_force_ages=ages,
+        )  # fmt: skip
+        if k > 0 and k % 10 == 0:
+            change += 0.01 * (felt - [0.0, 0.0, sensors.team.gravity])
+        if k < 100:
+            sensors.truth[2] += rng.normal(size=(2, 3))
+    np.testing.assert_allclose(change, sensors.truth[2], atol=1e-9)
+
+
+def test_noise_and_bias_of_an_accelerometer():
+    part = Noisy(
+        specific_force_noise=0.3, specific_force_bias=(0.5, -0.2, 0.1), specific_force_period=0.001,
+        specific_force_dropout=0.2,
+    )  # fmt: skip
+    felt, ages = Falling(part).feel(4000, (0.0, 0.0, 9.81))
+    fresh = felt[1:][np.ptp(np.diff(felt, axis=0), axis=(1, 2)) > 0.0]
+    np.testing.assert_allclose(fresh.mean(axis=(0, 1)), [0.5, -0.2, 9.91], atol=4.5 * 0.3 / 60)
+    np.testing.assert_allclose(fresh.std(axis=0), 0.3, rtol=0.06)
+    assert (ages[10:] > 0.0025).mean() == pytest.approx(0.2, abs=0.03)
 
 
 def test_attitudes_stay_unit_and_turn_about_the_body_axes():

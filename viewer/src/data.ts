@@ -100,6 +100,7 @@ export const WIDTHS = {
   tensions: (n: number) => n,
   desired_tensions: (n: number) => n,
   thrusts: (n: number) => n,
+  reeled: (n: number) => n,
   solve_time: () => 1,
   status: () => 1,
 };

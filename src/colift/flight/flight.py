@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from colift.flight.leg import Leg, Stretch, due_rows, places_of
 from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
 from colift.flight.membership import Membership
 from colift.interrupts import heard
+from colift.kernel.math import winch
 from colift.kernel.ports import PORTS, hold, hold_answer
 from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
@@ -36,7 +38,13 @@ from colift.world.plant.base import Start
 Progress = Callable[[float], None]
 """Called with the fraction flown, between 0 and 1."""
 
+Due = Event | Change | None
+"""What happens at a step: an event, a fault's change; None when parts are to be told the lengths of cables that are wound."""
+
 AnyPart = TypeVar("AnyPart", bound=Part)
+
+REBINDS = 20
+"""How often, while winches turn, limits and gains follow the lengths of the cables."""
 
 CHUNK = 1.0
 """Simulated seconds between two looks at progress and interrupts."""
@@ -72,12 +80,12 @@ class Flight:
             enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
         )
         self._disturbances: dict[int, DisturbancePart] = dict(winds_first)
-        self._load_mass = mission.true_team.load_mass
-        self._due = sorted(timetable(mission), key=lambda item: item[0])
+        self._load_mass = mission.true_bodies.load_mass
+        self._due: list[tuple[int, Due]] = sorted(timetable(mission), key=lambda item: item[0])
         self._legs: list[Leg] = []
         drones = mission.first_drones()
         start, thrusts = start_state(mission)
-        self._begin_leg(drones, self._fresh_memory(mission.team.of(drones), start))
+        self._begin_leg(drones, self._fresh_memory(drones, start))
         bus = self.bus
         self.wires.reference.writes.reference[:] = bus.reference[:] = mission.reference.sample(
             np.zeros(1), mission.team.of(drones)
@@ -221,7 +229,7 @@ class Flight:
         same = type(part) is type(before)
         if problems := part.wrong_lengths(self.mission.team.n):
             raise SettingError([Problem(name, "", text) for name, text in problems]).within(section)
-        packed = part.of(leg.drones).params(leg.team)
+        packed = part.of(leg.drones).params(self._told(section.partition(".")[0]))
         if section.startswith("disturbance."):
             if not same:
                 raise ColiftError(f"{section}: only one of the same kind can take its place")
@@ -268,7 +276,7 @@ class Flight:
             else self._parts[layer].carry_over(
                 getattr(old.circuit.wires, layer).memory, fresh, places
             )
-            for layer, fresh in self._fresh_memory(team, start).items()
+            for layer, fresh in self._fresh_memory(drones, start).items()
         }
         self._begin_leg(drones, memory)
         bus = self.bus
@@ -283,6 +291,8 @@ class Flight:
                 now[:] = before
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
         bus.thrusts[new] = team.masses[new] * team.gravity
+        if bus.reeled.any():
+            self._rebind()
         self.wires.reference.writes.reference[:] = old.circuit.wires.reference.writes.reference
 
     def recording(self, since: float = 0.0) -> Recording:
@@ -431,7 +441,7 @@ class Flight:
         load = log[:, where["load"]].reshape(len(log), 2, 3)
         found = contact.first_contact(
             team.radii,
-            team.cable_lengths,
+            team.cable_lengths + log[:, where["reeled"]].reshape(len(log), team.n, 3)[:, :, 0],
             positions,
             ends_of(load, team.n)[:, :, 0],
             log[:, where["attached"]],
@@ -457,10 +467,12 @@ class Flight:
         self._step = stop
         self.outcome = f"{text} at t = {step * every.step:g} s"
 
-    def _apply(self, due: Event | Change) -> None:
+    def _apply(self, due: Due) -> None:
         """Let an event or a fault happen, now."""
         drones = self.drones
-        if isinstance(due, Change):
+        if due is None:
+            self._rebind()
+        elif isinstance(due, Change):
             signal = getattr(self.bus, due.signal)
             value = np.array(due.value, dtype=np.float64)  # None becomes NaN
             if due.drone == LOAD:
@@ -476,12 +488,52 @@ class Flight:
                 self.lose([due.value])
         elif due.of_team == "join":
             self.regroup(sorted([*drones, due.value]))
+        elif due.of_winches:
+            self._wind(due)
         else:
             self.change(due.field, due.value)
 
-    def _fresh_memory(self, team: Team, start: Start) -> dict[str, Vector]:
+    def _wind(self, event: Event) -> None:
+        """Let winches begin to turn."""
+        leg, step = self._legs[-1], self._every.step
+        wanted = np.broadcast_to(event.value, self.mission.drones.count)[leg.drones]
+        last = 0.0
+        for i, length in enumerate(wanted.tolist()):
+            before, _, _ = winch.paid_out(leg.bus.winches, i, self.time)
+            change = length - leg.team.cable_lengths[i] - before
+            duration = event.winding(change)
+            leg.bus.winches[i] = before, change, self.time, duration
+            last = max(last, duration)
+        marks = {self._step + math.ceil(k * last / REBINDS / step) for k in range(1, REBINDS + 1)}
+        self._due = sorted(
+            [*self._due, *((mark, None) for mark in marks)], key=lambda item: item[0]
+        )
+
+    def _told(self, layer: str) -> Team:
+        """The team that a layer is bound to now: as at the start for one that sees what winches pay out, and adds it itself."""
+        leg = self._legs[-1]
+        winches = range(leg.team.n)
+        more = [winch.paid_out(leg.bus.winches, i, self.time)[0] for i in winches]
+        if not any(more) or "reeled" in PORTS[layer].sees:
+            return leg.team
+        return replace(leg.team, cable_lengths=leg.team.cable_lengths + more)
+
+    def _rebind(self) -> None:
+        """Bind all layers that do not see the winches to the lengths that the cables have now."""
+        leg = self._legs[-1]
+        for layer, part in self._parts.items():
+            if layer != "plant" and "reeled" not in PORTS[layer].sees:
+                packed = part.of(leg.drones).params(self._told(layer))
+                _refill(getattr(leg.circuit.wires, layer).params, packed, layer)
+        lengths = self.membership.team.cable_lengths.copy()
+        lengths[leg.drones] = self._told("allocation").cable_lengths
+        self.membership.team = replace(self.membership.team, cable_lengths=lengths)
+
+    def _fresh_memory(self, drones: list[int], start: Start) -> dict[str, Vector]:
+        team = self.mission.team.of(drones)
         memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
-        return {**memory, "plant": self.mission.plant.initial(team, start)}
+        real = replace(team, cable_lengths=self.mission.true_bodies.cable_lengths[drones])
+        return {**memory, "plant": self.mission.plant.initial(real, start)}
 
     def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
         """From here on these drones of the mission fly; every layer is bound to their team."""
@@ -504,7 +556,8 @@ class Flight:
         self._legs.append(Leg(drones, team, bus, wired, self._step))
 
     def _true_team(self, drones: list[int]) -> Team:
-        return replace(self.mission.true_team.of(drones), load_mass=self._load_mass)
+        bodies = replace(self.mission.true_bodies.of(drones), load_mass=self._load_mass)
+        return self.mission.plant.team_of(bodies, self.mission.drones.cable_density)
 
 
 class Snapshot(NamedTuple):
@@ -514,7 +567,7 @@ class Snapshot(NamedTuple):
     outcome: str
     membership: Membership
     load_mass: float
-    due: tuple[tuple[int, Event | Change], ...]
+    due: tuple[tuple[int, Due], ...]
     parts: dict[str, Part]
     disturbances: dict[int, DisturbancePart]
     legs: tuple[tuple[Leg, int, tuple[Stretch, ...]], ...]

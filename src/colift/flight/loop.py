@@ -27,6 +27,7 @@ from colift.errors import ColiftError
 from colift.flight import agents
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
 from colift.kernel.load import ends_of
+from colift.kernel.math.winch import paid_out
 from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named, type_of
 from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
 from colift.world.disturbance import push
@@ -48,7 +49,7 @@ Common = named_tuple(
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
         "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "reference",
         "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends", "reference_shift",
-        "lift_share", "unhooked", "attached",
+        "lift_share", "unhooked", "attached", "winches", "reeled",
         *(name for name in agents.SIGNALS if name != "carrying"),
     ],
     __name__,
@@ -125,6 +126,9 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
     first_cycle = (first + every.allocation - 1) // every.allocation
     for k in range(first, last):
         t = k * dt
+        for i in range(n):
+            length, rate, bend = paid_out(bus.winches, i, t)
+            bus.reeled[i, 0], bus.reeled[i, 1], bus.reeled[i, 2] = length, rate, bend
         _observe(wires.plant_observe, k, t, dt)
         _sense(wires.sensing, k, t, dt)
         _estimate(wires.estimation, k, t, dt)

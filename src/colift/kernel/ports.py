@@ -216,18 +216,22 @@ def _named(prefix: str) -> tuple[str, ...]:
     return tuple(f"{prefix}_{name}" for name in _TRUE.split())
 
 
+_FELT = ("measured_specific_forces", "specific_force_ages")
 _RECEIVED = ("received_tensions", "received_directions", "received_ages")
 
 PORTS: dict[str, Port] = {
     port.name: port
     for port in (
         Port("sensing", sees=(*_TRUE.split(), "stuck")),
-        Port("estimation", sees=(*_named("measured"), "measured_ages", "thrusts", *_RECEIVED)),
+        Port(
+            "estimation",
+            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", "reeled", "found_lengths", *_RECEIVED),
+        ),
         Port(
             "supervision",
             sees=(
                 *_named("estimated"), "estimated_ends", "estimated_forces", "estimated_wind", "thrusts",
-                "reference", *_RECEIVED,
+                "reference", "reeled", "found_lengths", *_RECEIVED,
             ),
         ),
         Port("reference", sees=()),
@@ -244,15 +248,16 @@ PORTS: dict[str, Port] = {
         Port(
             "observation",
             sees=(
-                *_named("estimated"), "estimated_ends", "thrusts", "standing", "held_forces",
-                *_RECEIVED,
+                *_named("estimated"), "estimated_ends", *_FELT, "thrusts", "standing",
+                "held_forces", "reeled", "lift_share", *_RECEIVED,
             ),
         ),
         Port(
             "position_control",
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
-                "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses",
+                "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses", "reeled",
+                "found_lengths",
                 *_RECEIVED,
             ),
         ),
@@ -268,11 +273,14 @@ PORTS: dict[str, Port] = {
             "detection",
             sees=(
                 "estimated_ends", *_named("estimated")[1:4], "estimated_ages", "thrusts",
-                "lift_share", *_RECEIVED,
+                "lift_share", "reeled", *_RECEIVED,
             ),
         ),
         Port("plant_observe", sees=()),
-        Port("plant", sees=("applied_thrusts", "applied_torques", "external_forces", "attached")),
+        Port(
+            "plant",
+            sees=("applied_thrusts", "applied_torques", "external_forces", "attached", "winches"),
+        ),
         Port(
             "disturbance",
             sees=(

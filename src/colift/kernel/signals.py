@@ -106,6 +106,10 @@ SIGNALS = (
     Signal("spans", ("n", 3), "m, m/s, m/s^2", "r_i - L_i", "-", "distance that each drone keeps from its cable's end, less the cable's length; two derivatives", writer="supervision"),
     Signal("unhooked", ("n",), "1", "-", "-", "1 for each cable that is told to let go of the load", writer="supervision"),
     Signal("lifted_mass", (1,), "kg", "-", "-", "mass of the load as weighed at lift-off; 0 where nobody weighs it", writer="supervision"),
+    Signal("measured_specific_forces", ("n", 3), "m/s^2", "-", "body", "acceleration of each drone less gravity's, as its accelerometer measures it", writer="sensing"),
+    Signal("specific_force_ages", ("n",), "s", "-", "-", "time since those samples were taken", writer="sensing"),
+    Signal("reeled", ("n", 3), "m, m/s, m/s^2", "-", "-", "cable that each winch has paid out since the start, with two derivatives"),
+    Signal("found_lengths", ("n",), "m", "-", "-", "by how much each cable is found to be longer than is told", writer="observation"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 
@@ -161,7 +165,17 @@ MESSAGES = (
 )  # fmt: skip
 """Of a team without a leader; not recorded."""
 
-HIDDEN = (ANSWER, NOMINAL, *LEAD, *ENDS, *MESSAGES)
+WINCHES = Signal(
+    "winches",
+    ("n", 4),
+    "m, m, s, s",
+    "-",
+    "-",
+    "what each winch does (:mod:`colift.kernel.math.winch`)",
+)
+"""Not recorded: the flight's events write it, and ``reeled`` is what comes of it."""
+
+HIDDEN = (ANSWER, NOMINAL, WINCHES, *LEAD, *ENDS, *MESSAGES)
 """Signals of the bus that stand outside of its row."""
 
 OF_ONE = (

@@ -20,12 +20,13 @@ from colift.kernel.signals import columns
 from colift.mission.criteria import METRICS
 from colift.mission.forecast import forecast
 from colift.mission.grounding import ground_checks
-from colift.mission.schema import Frame, Section, Timing
+from colift.mission.schema import Event, Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
-from colift.team import contact
+from colift.team import Team, contact
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
+from colift.world.plant.base import PlantPart
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ def cross_checks(
             yield Problem(
                 "timing.recording", f"{size / 1e9:.1f} GB", f"must record at most {limit}"
             )
-    yield from _event_checks(frame, dict(_with_paths(parts, lists)), broken)
+    yield from _event_checks(frame, dict(_with_paths(parts, lists)), broken, must_fly)
     yield from _criteria_checks(frame)
     if not broken & {"world", "load", "drones", "truth"}:
         weak = list(_strength_checks(frame)) if must_fly else []
@@ -82,7 +83,7 @@ def cross_checks(
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
-            team = frame.true_team if part.layer == "plant" else frame.team
+            team = _of_plant(frame, part) if isinstance(part, PlantPart) else frame.team
             found = part.check(team)
             if must_fly and not (found or weak):
                 found = part.conflicts(team)
@@ -100,6 +101,11 @@ def cross_checks(
     yield from _fault_checks(frame, parts, lists["fault"], broken)
     yield from ground_checks(frame, parts, broken)
     yield from _supervision_checks(frame, parts)
+
+
+def _of_plant(frame: Frame, plant: PlantPart, **changes: Any) -> Team:
+    """The bodies as a plant has them."""
+    return plant.team_of(replace(frame.true_bodies, **changes), frame.drones.cable_density)
 
 
 def _supervision_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
@@ -255,8 +261,11 @@ def _with_paths(
             yield f"{name}.{i}", part
 
 
-def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> Iterable[Problem]:
+def _event_checks(
+    frame: Frame, parts: Mapping[str, Part], broken: set[str], must_fly: bool
+) -> Iterable[Problem]:
     """Mistakes in the events, in the order in which they happen."""
+    wound: list[tuple[Array, Array]] = []
     n, timing, present = frame.drones.count, frame.timing, dict(parts)
     told = Declaration(timing, parts.get("sensing"), parts.get("actuation"))
     left = set(range(n))
@@ -270,12 +279,19 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
         if event.of_team:
             if "drones" not in broken:
                 yield from _team_change(f"events.{i}.value", name, event.value, left, n)
+        elif event.of_winches:
+            if not broken & {"world", "load", "drones", "truth", "timing"}:
+                yield from _winch_change(f"events.{i}", frame, event, present, wound, must_fly)
         elif section == "load":
             found = list(_setting_change(f"events.{i}", frame.load, section, name, event.value))
             yield from found
             if not found and not broken & {"world", "load", "drones", "truth"}:
-                team = replace(frame.true_team, load_mass=float(event.value))
-                for field, message in present["plant"].check(team) if "plant" in present else ():
+                plant = present.get("plant")
+                for field, message in (
+                    plant.check(_of_plant(frame, plant, load_mass=float(event.value)))
+                    if isinstance(plant, PlantPart)
+                    else ()
+                ):
                     yield Problem(
                         f"events.{i}.value", f"{event.value:g}", f"plant.{field} {message}"
                     )
@@ -291,6 +307,59 @@ def _event_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
             yield from _setting_change(f"events.{i}", present[section], section, name, event.value)
         elif event.field.startswith("disturbance."):
             yield Problem(f"events.{i}.field", event.field, "there is no such section")
+
+
+def _winch_change(
+    path: str,
+    frame: Frame,
+    event: Event,
+    parts: dict[str, Part],
+    wound: list[tuple[Array, Array]],
+    must_fly: bool,
+) -> Iterable[Problem]:
+    """Mistakes of cables that are wound; ``wound`` holds lengths and when each winch stops, of the events before."""
+    found = list(_setting_change(path, frame.drones, "drones", "cable_length", event.value))
+    if found:
+        yield from found
+        return
+    n, plant = frame.drones.count, parts.get("plant")
+    if isinstance(event.value, list) and len(event.value) != n:
+        message = f"must be one value or a list of drones.count = {n}"
+        yield Problem(f"{path}.value", f"{len(event.value)} values", message)
+        return
+    if isinstance(plant, PlantPart) and plant.reels:
+        message = f"needs winches, but plant.kind is {kind_of(type(plant))}: {plant.reels}"
+        yield Problem(f"{path}.field", event.field, message)
+        return
+    lengths, stops = wound[-1] if wound else (frame.team.cable_lengths, np.zeros(n))
+    wanted = np.array(np.broadcast_to(event.value, n), dtype=float)
+    turns = wanted != lengths
+    if (busy := turns & (event.at < stops)).any():
+        i = int(np.argmax(busy))
+        message = f"comes before the winch of drone {i} has stopped, at {stops[i]:.4g} s"
+        yield Problem(f"{path}.at", f"{event.at:g}", message)
+        return
+    times = np.array([event.winding(change) for change in wanted - lengths])
+    wound.append((wanted, np.where(turns, event.at + times, stops)))
+    true = frame.true_team
+    left = true.cable_lengths + wanted - frame.team.cable_lengths
+    if np.min(left) <= 0.0:
+        i = int(np.argmin(left))
+        message = f"leaves nothing of the cable of drone {i}, which is {-(left[i] - wanted[i]):.4g} m shorter than is told"
+        yield Problem(f"{path}.value", shown(event.value), message)
+        return
+    for name, part in parts.items():
+        if part.layer in ("fault", "reference"):
+            continue
+        if isinstance(part, PlantPart):
+            before, team = _of_plant(frame, part), _of_plant(frame, part, cable_lengths=left)
+        else:
+            before, team = frame.team, replace(frame.team, cable_lengths=wanted)
+        if part.check(before) or (must_fly and part.conflicts(before)):
+            continue  # told already
+        problems = part.check(team) or (part.conflicts(team) if must_fly else [])
+        for field, message in problems:
+            yield Problem(f"{path}.value", shown(event.value), f"{placed(name, field)} {message}")
 
 
 def _section_change(

@@ -145,6 +145,9 @@ class Drones(Section):
     """Principal moments of inertia, body frame, kg m^2; left out, they are estimated where ``arm`` is known."""
     cable_length: PerDrone = 1.0
     """m."""
+    cable_density: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    """Mass of the cables per length, as the controllers are told, kg/m: they reckon half of each cable to its drone, half to the load. So
+    do plants whose cables have no mass; that of ``bead-cables`` is its own."""
     max_thrust: ThrustPerDrone | None = None
     """Largest steady thrust of a drone, all its rotors together, N."""
     motor_lag: LagPerDrone | None = None
@@ -390,9 +393,15 @@ class Timing(Section):
 
 _CHANGING = "|".join(layer for layer in LAYERS if layer not in ("plant", "reference"))
 EVENT_FIELDS = (
-    r"^(load\.mass|drones\.(lose|join)|reference"
+    r"^(load\.mass|drones\.(lose|join|cable_length)|reference"
     rf"|({_CHANGING}|disturbance\.[0-9]{{1,3}})(\.[a-z_]+)?)$"
 )
+
+
+PEAK_SPEED, PEAK_BEND = 35.0 / 16.0, 84.0 * math.sqrt(5.0) / 25.0
+"""Of the septic way from rest to rest over one metre in one second (:func:`colift.kernel.math.smooth.rest_to_rest`)."""
+MOST_WINDING = 1.0
+"""Most acceleration of a winch's cable, m/s^2."""
 
 
 class Event(Section):
@@ -401,19 +410,33 @@ class Event(Section):
     at: Annotated[float, Field(ge=0.0)]
     """Time, s."""
     field: Annotated[str, Field(pattern=EVENT_FIELDS)]
-    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, a setting of a layer
+    """What changes: ``load.mass`` (the plant's only), ``drones.lose``, ``drones.join``, ``drones.cable_length``, a setting of a layer
     or of a disturbance such as ``allocation.mu`` or ``disturbance.0.force``, or a whole section such as
     ``reference``; ``allocation.kind`` puts another allocator, with its defaults, in place."""
     value: Any
     """New value, in the field's unit; for a section a table with ``kind`` and settings; for ``drones.lose`` the number, from 0, of the drone whose cable is
     cut and that leaves the team, which is told at once; for ``drones.join`` the drone that hooks in then, in
-    the widest gap between the cables, at the load's velocity, and that is not there before."""
+    the widest gap between the cables, at the load's velocity, and that is not there before; for ``drones.cable_length`` the
+    length to which winches bring the cables of the drones that fly then, m, one value or one per drone, which the controllers know."""
+    rate: Annotated[float, Field(gt=0.0, le=10.0)] = 0.2
+    """Of ``drones.cable_length``: fastest that a winch pays out or takes in, m/s. It goes smoothly from rest to rest, with
+    1 m/s^2 at most."""
 
     @property
     def of_team(self) -> str:
         """``"lose"`` or ``"join"`` where the drone ``value`` leaves or joins; empty for other changes."""
         section, _, name = self.field.rpartition(".")
-        return name if section == "drones" else ""
+        return name if section == "drones" and not self.of_winches else ""
+
+    @property
+    def of_winches(self) -> bool:
+        """Whether winches pay cable out or take it in."""
+        return self.field == "drones.cable_length"
+
+    def winding(self, change: float) -> float:
+        """Time that a winch takes for this change of a cable's length (m), s."""
+        way = abs(change)
+        return max(PEAK_SPEED * way / self.rate, math.sqrt(PEAK_BEND * way / MOST_WINDING))
 
 
 class Bound(Section):
@@ -467,7 +490,15 @@ class Frame(Section):
 
     @property
     def team(self) -> Team:
-        """The drones, cables and load as arrays."""
+        """The drones, cables and load as arrays, with the cables' mass at their ends."""
+        return self._roped(self._bare)
+
+    def _roped(self, bare: Team) -> Team:
+        density = self.drones.cable_density
+        return bare.with_ropes(density) if density > 0.0 else bare
+
+    @property
+    def _bare(self) -> Team:
         n, drones = self.drones.count, self.drones
         return Team.of_bodies(
             drones.numbers(),
@@ -486,7 +517,12 @@ class Frame(Section):
     @property
     def true_team(self) -> Team:
         """The bodies as they are; :attr:`team` is what the controllers are told."""
-        told, truth = self.team, self.truth
+        return self._roped(self.true_bodies)
+
+    @property
+    def true_bodies(self) -> Team:
+        """The same, without the cables' mass."""
+        told, truth = self._bare, self.truth
         return replace(
             told,
             load_mass=told.load_mass * truth.load_mass_factor,

@@ -15,6 +15,7 @@ from colift.study.campaign.judge import fate, held
 from colift.study.campaign.plan import Case, Labels, without_seed
 from colift.study.survival import FAULTS, WHOLE_TEAM
 from colift.world.actuation.motors import Motors
+from colift.world.sensing.base import SENSORS
 
 Overrides = dict[str, Any]
 Row = Mapping[str, Any]
@@ -33,12 +34,13 @@ WIND = [
     {"kind": "gust", "peak": [4.0, 3.0, 1.0], "at": 3.0, "every": 3.0},
     {"kind": "drag", "rotor_drag": ROTOR_DRAG},
 ]
-LATE = {f"{sensor}_delay": 0.02 for sensor in ("load", "tracking", "attitude", "rates")}
+LATE = {f"{sensor}_delay": 0.02 for sensor in SENSORS}
 EXACT = {
     **dict.fromkeys(
         ("load_position_noise", "load_velocity_noise", "position_noise", "velocity_noise"), 0.0
     ),
     "rates_noise": 0.0, "attitude_noise_deg": 0.0, "attitude_bias": 0.0,
+    "specific_force_noise": 0.0, "specific_force_bias": 0.0,
 }  # fmt: skip
 NOISY = {"kind": "noisy", **LATE}
 

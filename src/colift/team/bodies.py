@@ -133,6 +133,17 @@ class Team:
             **{name: getattr(self, name)[chosen] for name in (*PLACES.values(), "cable_lengths")},
         )
 
+    def with_ropes(self, density: float) -> Team:
+        """The team with the mass of cables of this density (kg/m), half of each to its drone and half to the load.
+
+        In balance that is exact, however much the rope sags: by the moments about either end, what a uniform rope does to the other
+        is a pull along the chord between them and half of its weight.
+        """
+        half = 0.5 * density * self.cable_lengths
+        return replace(
+            self, masses=self.masses + half, load_mass=self.load_mass + float(half.sum())
+        )
+
     @property
     def disc_areas(self) -> NDArray[np.float64]:
         """Area that the rotors of each drone sweep (n,), m^2, for momentum theory; NaN where it is not known."""

@@ -29,8 +29,10 @@ def first_contact(
 
     Parameters
     ----------
-    radii, lengths : (n,) array
-        Of drones and cables, m; NaN for a radius that is not known.
+    radii : (n,) array
+        Of the drones, m; NaN where it is not known.
+    lengths : (n,) or (rows, n) array
+        Of the cables, m.
     positions, ends : (rows, n, 3) array
         Of the drones, and of the cables' ends on the load, m.
     attached : (rows, n) array
@@ -38,11 +40,12 @@ def first_contact(
 
     """
     n = radii.size
+    lengths = np.broadcast_to(lengths, positions.shape[:2])
     rows = max(1, PAIRED // (n * n))
     for begin in range(0, len(positions), rows):
         part = slice(begin, begin + rows)
         found = min(
-            _contacts(radii, lengths, positions[part], ends[part], attached[part]),
+            _contacts(radii, lengths[part], positions[part], ends[part], attached[part]),
             key=lambda found: found[0],
             default=None,
         )

@@ -47,7 +47,8 @@ export const cables: Maker = (flight) => {
           continue;
         }
         // A parabola of the cable's length between its ends, never so flat that it looks taut.
-        const length = flight.info.cable_lengths[i]!;
+        const reeled = frame.reeled[i]!;
+        const length = flight.info.cable_lengths[i]! + (Number.isFinite(reeled) ? reeled : 0);
         const chord = from.distanceTo(to);
         const sag = Math.max(0.1 * length, Math.sqrt(Math.max(0.375 * chord * (length - chord), 0)));
         for (let k = 0; k < PIECES; k += 2) {

@@ -27,7 +27,7 @@ MEMORY = Layout(
     drone={
         "started": 1, "length": 1, "distance": 1, "speed": 1, "velocity": 3, "expected": 3,
         "cable": 1, "thrust": 1, "still": 1, "ages": 2, "now": 1, "steady": 1, "lack": 3,
-        "counts": 1,
+        "counts": 1, "reeled": 1,
     }
 )  # fmt: skip
 """Filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
@@ -90,9 +90,13 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if memory[o + M.started] == 0.0:
             memory[o + M.started] = 1.0
             memory[o + M.length] = memory[o + M.distance] = d
+            memory[o + M.reeled] = sees.reeled[i, 0]
             for k in range(3):
                 memory[o + M.velocity + k] = velocities[i, k]
-        speed = went = 0.0
+        # What a winch pays out is no sign.
+        memory[o + M.length] += sees.reeled[i, 0] - memory[o + M.reeled]
+        memory[o + M.reeled] = sees.reeled[i, 0]
+        went, speed = 0.0, -sees.reeled[i, 1]
         for k in range(3):
             speed += alpha[k] * (ends[i, 1, k] - velocities[i, k])
             expected = (thrusts[i] * axis[k] + tensions[i] * alpha[k]) / m

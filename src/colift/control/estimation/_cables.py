@@ -12,12 +12,12 @@ _TRUST = 1e-3
 
 
 @inline
-def load_from_drones(n, drones, width, memory, lengths, apart, params, guess):  # type: ignore[no-untyped-def]
+def load_from_drones(n, drones, width, memory, lengths, apart, params, reeled, found, guess):  # type: ignore[no-untyped-def]
     """Position and velocity of the load that fit taut cables best (least squares); ``guess`` fills gaps.
 
     Drone i's position and velocity stand at ``memory[drones + width * i]``, its cable's length at
-    ``params[lengths + apart * i]``. Two Gauss-Newton steps on ``|p - x_i| = L_i``; then
-    ``alpha_i . (v - v_i) = 0``, which rigid cables impose.
+    ``params[lengths + apart * i]``, to which ``reeled`` and ``found`` add. Two Gauss-Newton steps on ``|p - x_i| = L_i``; then
+    ``alpha_i . (v - v_i) = L_i'``, which rigid cables impose.
     """
     px, py, pz, vx, vy, vz = guess
     for sweep in range(3):
@@ -30,12 +30,13 @@ def load_from_drones(n, drones, width, memory, lengths, apart, params, guess):  
             scale = 1.0 / max(d, 1e-6)
             ax, ay, az = ax * scale, ay * scale, az * scale
             if sweep < 2:
-                r = params[lengths + apart * i] - d
+                r = params[lengths + apart * i] + reeled[i, 0] + found[i] - d
             else:
                 r = (
                     ax * (memory[o + 3] - vx)
                     + ay * (memory[o + 4] - vy)
                     + az * (memory[o + 5] - vz)
+                    + reeled[i, 1]
                 )
             xx, yy, zz = xx + ax * ax, yy + ay * ay, zz + az * az
             xy, xz, yz = xy + ax * ay, xz + ax * az, yz + ay * az

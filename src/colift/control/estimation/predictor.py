@@ -24,43 +24,59 @@ from colift.team import Team
 FINEST = 0.5e-3
 """The forecast remembers one acceleration for every so many seconds of the delay, s."""
 
+SPARE = 0.02
+"""By so much more than is told samples may be late, s; or by as much again, where that is more."""
+
 FILTER = Layout(team={"gain": 6, "gate": 2})
 """Gain by state (3) and measurement (2); the most that a measurement may surprise with."""
 PARAMS = Layout(
     team={
         "delay": 1, "turn": 1, "lag": 1, "period": 1, "patience": 1, "smooth": 1, "g": 1, "m_L": 1,
         "steady": 1, "coast": 1, "load": FILTER.size(0), "drones": FILTER.size(0), "room": 1,
+        "slots": 1, "stamped": 1,
     },
     drone={"m": 1, "L": 1},
 )  # fmt: skip
-"""``turn``: age of the attitudes; ``room``: accelerations that a body's ring has room for."""
+"""``turn``: age of the attitudes; ``room``: accelerations of the told delay, of ``slots`` that a body's ring
+has; whether samples are ``stamped``."""
 BODY = Layout(
     team={
         "started": 1, "waited": 1, "age": 1, "sample": 6, "state": 9, "attitude": 4,
-        "attitude_age": 1, "since": 1, "thrust": 1, "ring": None,
+        "attitude_age": 1, "since": 1, "thrust": 1, "places": 1, "ring": None,
     }
 )  # fmt: skip
 """Time ``waited`` since the last ``sample`` came, and its ``age``; ``state`` when it was taken: position, velocity, unexplained
-acceleration; age of the last measured attitude, and time ``since`` it came; ``thrust`` that acts; ``ring`` of known
+acceleration; age of the last measured attitude, and time ``since`` it came; ``thrust`` that acts; ``places``: of the ring, from the state's time to now; ``ring`` of known
 accelerations."""
 MEMORY = Layout(team={"load": None}, drone={"body": None})
 P, F, B = PARAMS.at, FILTER.at, BODY.at
 
 
 @inline
-def _advance(o, slot, places, dt, ax, ay, az, memory):  # type: ignore[no-untyped-def]
-    """Remember a known acceleration; move the state by the one that it replaces."""
+def _advance(o, slot, slots, moves, dt, ax, ay, az, memory):  # type: ignore[no-untyped-def]
+    """Remember a known acceleration; move the state by so many of those that follow its time, mostly one."""
     known = (ax, ay, az)
+    places = int(memory[o + B.places])
     for k in range(3):
-        old = known[k]
-        if places > 0:
-            ring = o + B.ring + 3 * slot + k
-            old = memory[ring]
-            memory[ring] = known[k]
+        memory[o + B.ring + 3 * slot + k] = known[k]
         s = o + B.state + k
-        old += memory[s + 6]
-        memory[s] += dt * (memory[s + 3] + 0.5 * dt * old)
-        memory[s + 3] += dt * old
+        for move in range(moves):
+            # The oldest is the one of `places` ago.
+            old = memory[o + B.ring + 3 * ((slot - places + move + slots) % slots) + k]
+            old += memory[s + 6]
+            memory[s] += dt * (memory[s + 3] + 0.5 * dt * old)
+            memory[s + 3] += dt * old
+    memory[o + B.places] = places + 1 - moves
+
+
+@inline
+def _moves(o, fresh, slots, dt, params, memory):  # type: ignore[no-untyped-def]
+    """By how many accelerations the state moves now: one more or less than time does, until it is as old as the samples are."""
+    if not fresh or params[P.stamped] == 0.0:
+        return 1
+    places = int(memory[o + B.places])
+    age = min(max(round(memory[o + B.age] / dt), 0), slots - 1)
+    return 1 + min(max(places - age, -1), 1)
 
 
 @inline
@@ -78,13 +94,12 @@ def _correct(o, gains, params, memory):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _forecast(o, slot, places, dt, memory, k):  # type: ignore[no-untyped-def]
-    """One axis of position and velocity now: the state moved through all that the ring remembers."""
-    s = o + B.state + k
+def _forecast(o, slot, slots, dt, memory, k):  # type: ignore[no-untyped-def]
+    """One axis of position and velocity now: the state moved through all that the ring remembers since its time."""
+    s, places = o + B.state + k, int(memory[o + B.places])
     p, v = memory[s], memory[s + 3]
     for j in range(places):
-        # The oldest is the one that is replaced next.
-        a = memory[o + B.ring + 3 * ((slot + 1 + j) % places) + k] + memory[s + 6]
+        a = memory[o + B.ring + 3 * ((slot - places + 1 + j + slots) % slots) + k] + memory[s + 6]
         p += dt * (v + 0.5 * dt * a)
         v += dt * a
     return p, v
@@ -157,7 +172,8 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     n = positions.shape[0]
     # Steps finer than the ring are taken several at once.
     room = int(params[P.room])
-    width = B.ring + 3 * room
+    slots = int(params[P.slots])
+    width = B.ring + 3 * slots
     steps = round(params[P.delay] / dt)
     stride = max((steps + room - 1) // room, 1)
     if step % stride != 0:
@@ -166,7 +182,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 ages[i, k] += dt
         return
     places = round(steps / stride)
-    slot = (step // stride) % max(places, 1)
+    slot = (step // stride) % slots
     dt = dt * stride
     g, m_L = params[P.g], params[P.m_L]
     keep = decay(dt, params[P.lag])
@@ -176,6 +192,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         m = params[P.rows + P.width * i + P.m]
         if memory[o + B.started] == 0.0:
             memory[o + B.thrust] = thrusts[i]
+            memory[o + B.places] = places
             memory[o + B.age] = measured_ages[i, 0] - dt
             memory[o + B.attitude_age] = measured_ages[i, 1] - dt
             for k in range(4):
@@ -200,7 +217,9 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         f, T = memory[o + B.thrust] / m, tensions[i]
         cx, cy, cz = T * directions[i, 0], T * directions[i, 1], T * directions[i, 2]
         px, py, pz = px + cx, py + cy, pz + cz
-        _advance(o, slot, places, dt, f * ux + cx / m, f * uy + cy / m, f * uz + cz / m - g, memory)
+        moves = _moves(o, fresh, slots, dt, params, memory)
+        ax, ay, az = f * ux + cx / m, f * uy + cy / m, f * uz + cz / m - g
+        _advance(o, slot, slots, moves, dt, ax, ay, az, memory)
         if fresh:
             _correct(o, P.drones, params, memory)
         for k in range(4):
@@ -212,22 +231,27 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             continue
         ages[i, 0] = 0.0
         for k in range(3):
-            p, v = _forecast(o, slot, places, dt, memory, k)
+            p, v = _forecast(o, slot, slots, dt, memory, k)
             estimated_positions[i, k] = p
             estimated_velocities[i, k] = v
     if memory[B.started] == 0.0:
         memory[B.age] = measured_ages[n, 0] - dt
+        memory[B.places] = places
     _start(0, 0, load[0:1], load[1:2], memory)
-    _advance(0, slot, places, dt, -px / m_L, -py / m_L, -pz / m_L - g, memory)
     tracked = _sampled(
         0, 0, measured_ages[n, 0], params[P.period], dt, memory, load[0:1], load[1:2]
     )
+    moves = _moves(0, tracked, slots, dt, params, memory)
+    _advance(0, slot, slots, moves, dt, -px / m_L, -py / m_L, -pz / m_L - g, memory)
     s = B.state
     if not tracked and memory[B.waited] > params[P.patience] + params[P.period]:
         guess = (
             memory[s], memory[s + 1], memory[s + 2], memory[s + 3], memory[s + 4], memory[s + 5]
         )  # fmt: skip
-        found = load_from_drones(n, width + s, width, memory, P.rows + P.L, P.width, params, guess)
+        found = load_from_drones(
+            n, width + s, width, memory, P.rows + P.L, P.width, params, sees.reeled,
+            sees.found_lengths, guess,
+        )  # fmt: skip
         for k in range(6):
             memory[B.sample + k] = found[k]
         memory[B.waited] = params[P.patience]
@@ -236,7 +260,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         _correct(0, P.load, params, memory)
     ages[n, 0] = 0.0
     for k in range(3):
-        p, v = _forecast(0, slot, places, dt, memory, k)
+        p, v = _forecast(0, slot, slots, dt, memory, k)
         estimated_load[0, k] = p
         estimated_load[1, k] = v
 
@@ -276,6 +300,9 @@ class Predictor(EstimationPart):
     do not explain (wind, tension errors) is a third state. Attitudes are smoothed by the measured rates but,
     like these, not carried forward: the attitude controller has the torques to do so.
 
+    How late a sample is it says itself, by the time at which it was taken: so a delay that is told wrongly is found with the first
+    samples, in hover too, where commands and answers have nothing to be correlated.
+
     Without a load measurement for ``patience`` the load is found from the drones and their cables' lengths. A
     drone without measurements is carried forward for ``coast``.
     """
@@ -293,6 +320,9 @@ class Predictor(EstimationPart):
     """Age of the measured positions and velocities, s; ``timing.delay`` where the mission has one."""
     attitude_delay: Annotated[float, Field(ge=0.0, le=0.5)] = 0.02
     """Age of the measured attitudes, s; ``timing.delay`` where the mission has one."""
+    delay_from: Literal["told", "stamps"] = "stamps"
+    """Where the age of measured positions and velocities is known from: the stamps of the samples, up to twice ``delay`` or 20 ms
+    more, until the first of which ``delay`` stands; or ``delay`` alone."""
     lag: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
     """Time constant of the motors, s; that of the mission's where not given."""
     period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.005
@@ -333,7 +363,8 @@ class Predictor(EstimationPart):
         return PARAMS.pack(
             team.n, delay=self.delay, turn=self.attitude_delay, lag=self.lag, period=self.period,
             patience=patience, smooth=self.attitude_filter, g=team.gravity, m_L=team.load_mass,
-            steady=self.steady, coast=self.coast, room=self._room, m=team.masses,
+            steady=self.steady, coast=self.coast, room=self._room, slots=self._slots,
+            stamped=float(self.delay_from == "stamps"), m=team.masses,
             L=team.cable_lengths,
             load=self._filter(self.load_position_noise, self.load_velocity_noise),
             drones=self._filter(self.position_noise, self.velocity_noise),
@@ -344,9 +375,13 @@ class Predictor(EstimationPart):
         return FILTER.pack(0, gain=gain.ravel(), gate=self.gate * surprise)
 
     def layout(self) -> Layout:
-        width = BODY.filled(ring=3 * self._room).size(0)
+        width = BODY.filled(ring=3 * self._slots).size(0)
         return MEMORY.filled(load=width, body=width)
 
     @property
     def _room(self) -> int:
         return math.ceil(self.delay / FINEST) + 1
+
+    @property
+    def _slots(self) -> int:
+        return self._room + math.ceil(max(self.delay, SPARE) / FINEST)

@@ -12,7 +12,7 @@ from colift.control.observation.base import SIGNATURE, ObservationPart
 from colift.control.tuning import Delays
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import rotors
+from colift.kernel.math import quaternion, rotors
 from colift.kernel.math.small import solve_symmetric
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
@@ -21,21 +21,35 @@ from colift.team import Team
 PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "total": 1, "own": 1, "limit": 1, "lag": 1, "delay": 1, "breeze": 1,
-        "rotors": 1,
+        "rotors": 1, "learn": 1, "doubt": 1,
     },
-    drone={"m": 1, "drag": 1},
+    drone={"m": 1, "drag": 1, "L": 1},
 )  # fmt: skip
 """Bandwidths of the observers of the ``total`` momentum and of each drone's ``own``, 1/s; ``limit`` over weight."""
 MEMORY = Layout(
-    team={"started": 1, "momentum": 3, "common": 3, "wind": 3},
-    drone={"own": 3, "felt": 3, "direction": 3, "thrust": 1, "apart": 3},
-)
+    team={"started": 1, "momentum": 3, "common": 3, "wind": 3, "led": 1},
+    drone={
+        "own": 3, "felt": 3, "direction": 3, "thrust": 1, "apart": 3,
+        "length": 1, "known": 1, "wrong": 1, "pull": 1, "pulled": 1,
+    },
+)  # fmt: skip
 """``momentum`` and ``own``: as far as explained; ``felt``: force beyond thrust, weight and the wanted pull; ``common``: per mass;
-``apart``: by how much what a drone felt while its cable was slack differs from what all felt in common."""
+``apart``: by how much what a drone felt while its cable was slack differs from what all felt in common; ``length`` found beyond
+the one told, time for which it is ``known``, whether it is ``wrong`` enough to be used; ``pull`` along the cable
+by specific force, and whether there is any (``pulled``); whether the load has been ``led`` off the ground."""
 P, M = PARAMS.at, MEMORY.at
 
 DOUBT = 0.05
 """Difference from the common wind, in g, from which the observation of a drone counts for little."""
+
+PULLS = 0.25
+"""Share of the wanted tension from which on a cable counts as taut."""
+PROMPT = 0.05
+"""Time constant of the tension by which that is judged, s."""
+STEADY = 0.1
+"""Speed at which the ends of a taut cable may seem to part, m/s."""
+FIRST = 0.05
+"""Time over which a length is known by before it is used, s."""
 
 Drag = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -72,6 +86,63 @@ def _common(n, params, memory):  # type: ignore[no-untyped-def]
     return solve_symmetric(xx, xy, xz, yy, yz, zz, bx, by, bz)
 
 
+@inline
+def _feel(i, dt, sees, params, memory):  # type: ignore[no-untyped-def]
+    """Tension of cable i beside what is common, and not taken for wind: by specific force, at once; without one as observed, by and by."""
+    p, o, v = P.rows + P.width * i, M.rows + M.width * i, sees.estimated_velocities
+    f, q, m = sees.measured_specific_forces[i], sees.estimated_attitudes, params[p + P.m]
+    tension = sees.received_tensions[i]
+    if f[0] == 0.0 and f[1] == 0.0 and f[2] == 0.0:  # nobody measures it
+        for k in range(3):
+            strange = memory[o + M.felt + k] - memory[o + M.apart + k] - m * memory[M.common + k]
+            tension += memory[o + M.direction + k] * strange
+        return tension
+    world = quaternion.into_body(q[i, 0], -q[i, 1], -q[i, 2], -q[i, 3], f[0], f[1], f[2])  # back
+    known = rotors.force_of(
+        i, memory[o + M.thrust], q, sees.estimated_rates, params[P.delay], params[p + P.drag],
+        memory[M.wind : M.wind + 3], v,
+    )  # fmt: skip
+    pull = 0.0
+    for k in range(3):
+        strange = m * (world[k] - memory[M.common + k]) - known[k]
+        pull += memory[o + M.direction + k] * strange
+    keep = decay(dt, PROMPT) if memory[o + M.pulled] != 0.0 else 0.0
+    memory[o + M.pull] = keep * memory[o + M.pull] + (1.0 - keep) * pull
+    if memory[o + M.pulled] != 0.0:
+        tension = memory[o + M.pull]
+    memory[o + M.pulled] = 1.0
+    return tension
+
+
+@kernel(SIGNATURE)
+def _measure(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    """Learn how much longer than told each cable is, while it is taut."""
+    dt, x, v, ends = (
+        now.dt,
+        sees.estimated_positions,
+        sees.estimated_velocities,
+        sees.estimated_ends,
+    )
+    n = x.shape[0]
+    for i in range(n):
+        p, o = P.rows + P.width * i, M.rows + M.width * i
+        size = speed = 0.0
+        for k in range(3):
+            size += (ends[i, 0, k] - x[i, k]) ** 2
+            speed += memory[o + M.direction + k] * (ends[i, 1, k] - v[i, k])
+        T, tension = sees.received_tensions[i], _feel(i, dt, sees, params, memory)
+        taut = tension > PULLS * T and T > 0.0 and abs(speed - sees.reeled[i, 1]) < STEADY
+        if taut and sees.lift_share[0] >= 1.0:
+            memory[o + M.known] = min(memory[o + M.known] + dt, params[P.learn])
+            more = math.sqrt(size) - params[p + P.L] - sees.reeled[i, 0]
+            memory[o + M.length] += dt / memory[o + M.known] * (more - memory[o + M.length])
+        doubtful = abs(memory[o + M.length]) > params[P.doubt] * params[p + P.L]
+        if doubtful and memory[o + M.known] >= FIRST:
+            memory[o + M.wrong] = 1.0
+        if memory[o + M.wrong] != 0.0:
+            writes.found_lengths[i] = memory[o + M.length]
+
+
 @kernel(SIGNATURE)
 def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
@@ -86,6 +157,8 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     stands, held = sees.standing[n] != 0.0, sees.held_forces
     fresh = memory[M.started] == 0.0
     memory[M.started] = 1.0
+    if fresh and stands:  # a team that takes off measures its cables when it hooks them
+        memory[M.led] = 1.0
     weight = pull_of_wind = 0.0
     for i in range(n):
         o, m = M.rows + M.width * i, params[P.rows + P.width * i + P.m]
@@ -174,6 +247,8 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         for k in range(3):
             forces[i, k] *= shrink
             forces[n, k] -= forces[i, k]
+    if params[P.learn] > 0.0 and not stands and memory[M.led] == 0.0:
+        _measure(now, sees, params, memory, writes)
 
 
 class Momentum(ObservationPart, Delays):
@@ -184,6 +259,10 @@ class Momentum(ObservationPart, Delays):
     An observer of each drone's own momentum finds what it feels beyond thrust, weight and the wanted pull: across the cable that is wind,
     along it nobody can tell wind from tension. That part is filled in from the wind per mass that all feel alike, and from what
     each drone felt beside that while its cable was slack, if it ever was.
+
+    Each drone also measures its cable: how far the load's end is while the cable is taut, which it is where its accelerometer (or,
+    without one, the observer) feels at least a quarter of the wanted tension and the ends do not part. A length that differs from the told one by more than ``length_doubt`` takes its place
+    (``found_lengths``); a smaller difference is left to stretch, sag and the sensors.
     """
 
     kernel = _observe
@@ -204,6 +283,10 @@ class Momentum(ObservationPart, Delays):
     """How fast what all drones feel is taken for wind in their rotors, over the bandwidth of the velocity loop."""
     rotors: Annotated[float, Field(gt=0.0, le=1.0)] = 0.7
     """Share of what all drones feel that is the drag of rotors and not of bodies."""
+    learning: Annotated[float, Field(ge=0.0, le=100.0)] = 2.0
+    """Time over which the length of each cable is averaged while it is taut, s; 0: told lengths are believed."""
+    length_doubt: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.03
+    """Share of a cable's length by which it must be found longer or shorter than is told before what is found is used."""
     limit: Annotated[float, Field(ge=0.0, le=10.0)] = 1.2
     """Bound on a force over the drone's weight; on that of all, over the weight of all."""
 
@@ -220,4 +303,5 @@ class Momentum(ObservationPart, Delays):
             own=self.own * velocity, drag=self.settled("rotor_drag", team),
             breeze=self.breeze * velocity, rotors=self.rotors, limit=self.limit, lag=self.lag,
             delay=self.delay if self.predicted else 0.0, m=team.masses,
+            learn=self.learning, doubt=self.length_doubt, L=team.cable_lengths,
         )  # fmt: skip

@@ -98,7 +98,7 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
     alpha = sees.received_directions
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
-    n = x.shape[0]
+    reeled, n = sees.reeled, x.shape[0]
     g, delay = params[P.g], params[P.delay]
     lag, keep = decay(dt, params[P.lag]), decay(dt, params[P.thrust_filter])
     omega = params[P.frequency]
@@ -107,7 +107,7 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
         if memory[o + M.started] == 0.0:
             for k in range(3):
                 memory[o + M.direction + k] = alpha[i, k]
-        L = params[P.rows + P.width * i + P.L]
+        L = params[P.rows + P.width * i + P.L] + reeled[i, 0]
         reach = params[P.max_swing] / (omega * omega * L)
         lead(i, alpha, sees.nominal_forces, omega, dt, memory, o + M.direction, reach)
         _observe(i, v, params, memory, o)
@@ -115,12 +115,13 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
     for i in range(n):
         o = M.rows + M.width * i
         p = P.rows + P.width * i
-        m, L = params[p + P.m], params[p + P.L]
+        m, L = params[p + P.m], params[p + P.L] + reeled[i, 0]
         push = missing = 0.0
         for k in range(3):
             a, d = memory[o + M.direction + k], memory[o + M.force + k]
             x_e = x[i, k] - (ends[i, 0, k] - L * a)
             v_e = v[i, k] - (ends[i, 1, k] - L * memory[o + M.direction + 3 + k])
+            v_e += reeled[i, 1] * a
             u[i, k] = -params[P.velocity] * (v_e + params[P.position] * x_e)
             push += u[i, k] * u[i, k]
             missing += a * (wind[k] - d)
@@ -129,6 +130,8 @@ def _observe_and_control(now, sees, params, memory, writes):  # type: ignore[no-
         for k in range(3):
             a, d = memory[o + M.direction + k], memory[o + M.force + k]
             needed = ends[i, 2, k] - L * memory[o + M.direction + 6 + k] + (g if k == 2 else 0.0)
+            turning = memory[o + M.direction + 3 + k]
+            needed -= 2.0 * reeled[i, 1] * turning + reeled[i, 2] * a
             u[i, k] = m * (needed + share * u[i, k]) - T[i] * a - (d + missing * a)
         least, most = m * g * params[P.min_thrust], m * g * params[P.max_thrust]
         limit(i, u, least, most, params[P.tangent])

@@ -33,12 +33,12 @@ def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped
     T, alpha = sees.received_tensions, sees.received_directions
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
     rates = writes.desired_rates
-    n = x.shape[0]
+    reeled, n = sees.reeled, x.shape[0]
     g, limit = params[P.g], params[P.limit]
     keep = decay(dt, params[P.thrust_filter])
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
-        m_i, L_i = params[p + P.m], params[p + P.L]
+        m_i, L_i = params[p + P.m], params[p + P.L] + reeled[i, 0]
         fresh = memory[o + M.started] == 0.0
         memory[o + M.started] = 1.0
         S, a = o + M.integral, o + M.alpha
@@ -50,8 +50,9 @@ def _feed_forward(now, sees, params, memory, writes):  # type: ignore[no-untyped
         for k in range(3):
             # The drone's place, velocity and acceleration at the end of the filtered cable.
             x_e = x[i, k] - (ends[i, 0, k] - L_i * memory[a + k])
-            v_e = v[i, k] - (ends[i, 1, k] - L_i * memory[a + 3 + k])
+            v_e = v[i, k] - (ends[i, 1, k] - L_i * memory[a + 3 + k]) + reeled[i, 1] * memory[a + k]
             acceleration = ends[i, 2, k] - L_i * memory[a + 6 + k]
+            acceleration -= 2.0 * reeled[i, 1] * memory[a + 3 + k] + reeled[i, 2] * memory[a + k]
             memory[S + k] = min(max(memory[S + k] + dt * x_e, -limit), limit)
             gravity = g if k == 2 else 0.0
             u[i, k] = (

@@ -73,7 +73,8 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     reference, wanted, forces = sees.reference, sees.wanted_ends, sees.estimated_forces
     T, alpha, nominal = sees.received_tensions, sees.received_directions, sees.nominal_forces
     u, thrusts, attitudes = writes.drone_forces, writes.thrusts, writes.desired_attitudes
-    spans, courses = sees.spans, sees.courses
+    spans, courses, reeled = sees.spans, sees.courses, sees.reeled
+    found = sees.found_lengths
     rates, planned = writes.desired_rates, memory[M.planned : M.planned + 3]
     n = x.shape[0]
     g, m_L, omega = params[P.g], params[P.m_L], params[P.frequency]
@@ -87,7 +88,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     stands = sees.standing[n] != 0.0
     height = 0.0
     for i in range(n):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
         d = o + M.direction
         height += (x[i, 2] - ends[i, 0, 2]) / n
         swinging = n <= 2 and not stands and math.isnan(nominal[i, 0, 0])
@@ -116,12 +117,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     k1, k2, k3, k4 = soft * params[P.velocity], soft * soft * params[P.stiffness], 0.0, 0.0
     upright, lift = k1, k2
     if n <= 2 and not stands:
-        L = params[P.rows + P.L]
+        L = params[P.rows + P.L] + reeled[0, 0] + found[0]
         k1, k2, k3, k4 = pendulum_gains(g, min(max(height, 0.2 * L), 2.0 * L), params[P.band])
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
-        m, L = params[p + P.m], params[p + P.L]
-        span, rate, bend = L + spans[i, 0], spans[i, 1], spans[i, 2]
+        m, L = params[p + P.m], params[p + P.L] + reeled[i, 0] + found[i]
+        span = L + spans[i, 0]
+        rate, bend = spans[i, 1] + reeled[i, 1], spans[i, 2] + reeled[i, 2]
         led = not math.isnan(courses[i, 0, 0])
         push = 0.0
         for k in range(3):

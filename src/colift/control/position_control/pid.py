@@ -41,7 +41,7 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     keep_u = decay(dt, params[P.thrust_filter])
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
-        m_i, L_i = params[p + P.m], params[p + P.L]
+        m_i, L_i = params[p + P.m], params[p + P.L] + sees.reeled[i, 0]
         fresh = memory[o + M.started] == 0.0
         memory[o + M.started] = 1.0
         S, a, a_dot = o + M.integral, o + M.alpha, o + M.alpha_rate
@@ -54,7 +54,8 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             memory[a_dot + k] = keep_alpha * memory[a_dot + k] + (1.0 - keep_alpha) * rate
             memory[a + k] = alpha[i, k]
             x_e = x[i, k] - (ends[i, 0, k] - L_i * alpha[i, k])
-            v_e = v[i, k] - (ends[i, 1, k] - L_i * memory[a_dot + k])
+            paid_out = sees.reeled[i, 1] * alpha[i, k]
+            v_e = v[i, k] - (ends[i, 1, k] - L_i * memory[a_dot + k]) + paid_out
             memory[S + k] = min(max(memory[S + k] + dt * x_e, -limit), limit)
             gravity = g if k == 2 else 0.0
             # u_i = m_i (g e3 + xdd_Ld) - T_id alpha_id - k_p x_e - k_d xdot_e - k_i int x_e

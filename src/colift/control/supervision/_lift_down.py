@@ -16,7 +16,7 @@ from colift.control.supervision._lift_memory import (
     begin_to_hook,
     go,
 )
-from colift.control.supervision._lift_senses import hold_out, make_up, usual
+from colift.control.supervision._lift_senses import hold_out, length, make_up, usual
 from colift.control.supervision._lift_up import NEAR
 from colift.control.supervision._lift_ways import arc, set_off, steady
 from colift.kernel.jit import inline
@@ -76,7 +76,7 @@ def land(t, time, dt, sees, params, memory, writes):  # type: ignore[no-untyped-
     standing = True
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
-        L, m = params[p + P.L], params[p + P.m]
+        L, m = length(i, sees, params), params[p + P.m]
         b = memory[o + M.start : o + M.start + 3]
         centre = memory[M.goal : M.goal + 3]
         start = (b[0] - centre[0], b[1] - centre[1], b[2] - centre[2])
@@ -160,7 +160,7 @@ def slacken(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
     n = sees.estimated_positions.shape[0]
     done = time >= REST
     for i in range(n):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        o, L = M.rows + M.width * i, length(i, sees, params)
         pace = (NEAR - 1.0) * L - memory[o + M.span]
         memory[o + M.want] = min(max(2.0 * pace, -0.1 * L), 0.1 * L)
         done = done and abs(pace) < 0.01 * L
@@ -177,7 +177,7 @@ def slacken(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
         return
     go(memory, RELEASE if params[P.release] != 0.0 else LAND, t)
     for i in range(n):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        o, L = M.rows + M.width * i, length(i, sees, params)
         memory[o + M.want] = memory[o + M.sign] = memory[o + M.down] = 0.0
         for k in range(3):
             away = (L + memory[o + M.span]) * sees.received_directions[i, k]

@@ -46,7 +46,7 @@ by how much the reference is flown ``above`` itself; observer of the vertical
 a ``slow`` descent; force per mass that all drones feel, now (``air``) and when they felt what is their mean (``calm``); whether the load is to
 be hooked ``again``, and how often something went otherwise than planned (``setbacks``).
 Of a drone: ``own`` momentum as far as explained and the force ``felt``; ``bias`` made up for; where it ``start``ed; ``span`` with derivatives
-and the rate that it ``want``s; ``mean`` force, while slack or in flight, without its cable's."""
+and the rate that it ``want``s; ``length`` of its cable as measured, less what is wound out; ``mean`` force, while slack or in flight, without its cable's."""
 P, M = PARAMS.at, MEMORY.at
 
 FLY, STAND, CLIMB, HOOK, TENSION, RISE = (

@@ -27,6 +27,12 @@ def span_of(i, sees):  # type: ignore[no-untyped-def]
 
 
 @inline
+def length(i, sees, params):  # type: ignore[no-untyped-def]
+    """Length of cable i as it is wound out and has been found in flight, m: that from which spans are counted."""
+    return params[P.rows + P.width * i + P.L] + sees.reeled[i, 0] + sees.found_lengths[i]
+
+
+@inline
 def feel(sees, params, memory, dt):  # type: ignore[no-untyped-def]
     """Observers: what drones feel beyond thrust, drag and weight, the air's part of it, and the vertical force on the whole."""
     x, v, q = sees.estimated_positions, sees.estimated_velocities, sees.estimated_attitudes

@@ -16,7 +16,15 @@ from colift.control.supervision._lift_memory import (
     go,
     try_again,
 )
-from colift.control.supervision._lift_senses import alone, forget, hold_out, make_up, pull, span_of
+from colift.control.supervision._lift_senses import (
+    alone,
+    forget,
+    hold_out,
+    length,
+    make_up,
+    pull,
+    span_of,
+)
 from colift.control.supervision._lift_ways import arc, set_off
 from colift.kernel.jit import inline
 from colift.kernel.math.smooth import decay, rest_to_rest
@@ -58,7 +66,7 @@ def strays(sees, params, memory):  # type: ignore[no-untyped-def]
     """How far the drones are from rest at their places in the formation: at most 1 where it is formed."""
     worst = 0.0
     for i in range(sees.estimated_positions.shape[0]):
-        L = params[P.rows + P.width * i + P.L]
+        L = length(i, sees, params)
         away = fast = 0.0
         for k in range(3):
             place = memory[M.place + k] - NEAR * L * sees.received_directions[i, k]
@@ -77,7 +85,7 @@ def stand(t, time, sees, params, memory):  # type: ignore[no-untyped-def]
     for k in range(3):
         place[k] += (load[0, k] - place[k]) / memory[M.count]
     for i in range(x.shape[0]):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        o, L = M.rows + M.width * i, length(i, sees, params)
         memory[o + M.span] = (NEAR - 1.0) * L
         for k in range(3):
             memory[o + M.start + k] += (x[i, k] - memory[o + M.start + k]) / memory[M.count]
@@ -97,7 +105,7 @@ def climb(t, time, dt, sees, params, memory, courses):  # type: ignore[no-untype
     s, s1, s2, _ = rest_to_rest(time / params[P.climb])
     s1, s2 = s1 / params[P.climb], s2 / params[P.climb] ** 2
     for i in range(n):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        o, L = M.rows + M.width * i, length(i, sees, params)
         a = sees.received_directions[i]
         b = memory[o + M.start : o + M.start + 3]
         start = (b[0] - place[0], b[1] - place[1], b[2] - place[2])
@@ -151,8 +159,7 @@ def hook(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
             memory[o + M.spread] = math.sqrt(memory[o + M.spread] / max(memory[M.count], 1.0))
     hooked, lost = 0.0, 0.0
     for i in range(n):
-        p, o = P.rows + P.width * i, M.rows + M.width * i
-        L = params[p + P.L]
+        o, L = M.rows + M.width * i, length(i, sees, params)
         hold_out(i, dt, params, memory)
         distance, tension = pull(i, sees, params, memory)
         if memory[o + M.hooked] == 0.0:
@@ -167,10 +174,10 @@ def hook(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
             if memory[o + M.sign] > PULLING:
                 memory[o + M.hooked] = 1.0
                 memory[o + M.want] = 0.0
-                memory[o + M.length] = distance
+                memory[o + M.length] = distance - sees.reeled[i, 0]
             if span > (FAR - 1.0) * L:
                 lost = 1.0
-        elif distance < memory[o + M.length] - LOOSE * L:
+        elif distance < memory[o + M.length] + sees.reeled[i, 0] - LOOSE * L:
             memory[o + M.hooked] = memory[o + M.sign] = 0.0
         else:
             hooked += 1.0
@@ -179,14 +186,14 @@ def hook(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
         go(memory, TENSION, t)
         for i in range(n):
             memory[M.rows + M.width * i + M.sign] = 0.0
-    elif lost != 0.0 or time > LEARN + params[P.patience] + 3.0 * way_out(params):
+    elif lost != 0.0 or time > LEARN + params[P.patience] + 3.0 * way_out(sees, params):
         give_up(t, params, memory)
 
 
 @inline
-def way_out(params):  # type: ignore[no-untyped-def]
+def way_out(sees, params):  # type: ignore[no-untyped-def]
     """Time in which the first drone goes from where its cable is slack to where it is given up, s."""
-    L = params[P.rows + P.L]
+    L = length(0, sees, params)
     return (FAR - NEAR) * L / params[P.hook] + 2.0 * min(AROUND * L, BOUND) / params[P.catch]
 
 
@@ -194,9 +201,9 @@ def way_out(params):  # type: ignore[no-untyped-def]
 def loosened(dt, sees, params, memory):  # type: ignore[no-untyped-def]
     """Whether a cable that was hooked is slack again."""
     for i in range(sees.estimated_positions.shape[0]):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
+        o, L = M.rows + M.width * i, length(i, sees, params)
         distance, _ = span_of(i, sees)
-        short = distance < memory[o + M.length] - LOOSE * L
+        short = distance < memory[o + M.length] + sees.reeled[i, 0] - LOOSE * L
         memory[o + M.sign] = memory[o + M.sign] + dt if short else 0.0
         if memory[o + M.sign] > LOOSENED:
             return True
@@ -271,20 +278,22 @@ def weigh(sees, params, memory):  # type: ignore[no-untyped-def]
     for i in range(n):
         o = M.rows + M.width * i
         distance, _ = span_of(i, sees)
+        bare = distance - sees.reeled[i, 0]
         if memory[M.count] == 1.0:
-            memory[o + M.length] = distance
-        memory[o + M.length] += (distance - memory[o + M.length]) / memory[M.count]
+            memory[o + M.length] = bare
+        memory[o + M.length] += (bare - memory[o + M.length]) / memory[M.count]
 
 
 @inline
-def rise(t, time, params, memory, n):  # type: ignore[no-untyped-def]
+def rise(t, time, sees, params, memory, n):  # type: ignore[no-untyped-def]
     """To where the reference begins; spans become the cables' lengths as they were measured."""
     part = min(time / HAND_OVER, 1.0)
     memory[M.share] = memory[M.rising] + part * (1.0 - memory[M.rising])
     done = time >= memory[M.way]
     for i in range(n):
-        o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L]
-        pace = min(max(memory[o + M.length], 0.9 * L), 1.1 * L) - L - memory[o + M.span]
+        o, L = M.rows + M.width * i, length(i, sees, params)
+        measured = memory[o + M.length] + sees.reeled[i, 0]
+        pace = min(max(measured, 0.9 * L), 1.1 * L) - L - memory[o + M.span]
         memory[o + M.want] = 0.0 if done else min(max(2.0 * pace, -0.05 * L), 0.05 * L)
     if done:
         go(memory, FLY, t)

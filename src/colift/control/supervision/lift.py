@@ -31,7 +31,7 @@ from colift.control.supervision._lift_memory import (
     P,
     go,
 )
-from colift.control.supervision._lift_senses import feel
+from colift.control.supervision._lift_senses import feel, length
 from colift.control.supervision._lift_up import (
     RAISE,
     SLOWLY,
@@ -75,7 +75,7 @@ def _begin(t, sees, params, memory):  # type: ignore[no-untyped-def]
     n, above = sees.estimated_positions.shape[0], 0.0
     for i in range(n):
         height = sees.estimated_positions[i, 2] - sees.estimated_load[0, 2]
-        above += height / params[P.rows + P.width * i + P.L] / n
+        above += height / length(i, sees, params) / n
     memory[M.ground] = params[P.ground]
     memory[M.phase], memory[M.since] = (STAND if above < STANDING else FLY), t
     memory[M.share] = 0.0 if above < STANDING else 1.0
@@ -117,7 +117,7 @@ def _lift(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     elif now_in == TENSION:
         tension(t, dt, sees, params, memory, home)
     elif now_in == RISE:
-        rise(t, time, params, memory, n)
+        rise(t, time, sees, params, memory, n)
     elif now_in == FLY:
         rate = _fly(t, time, params, memory, home)
     elif now_in == LOWER:

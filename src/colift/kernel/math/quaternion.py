@@ -29,6 +29,14 @@ def third_axis(w, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inline
+def into_body(w, x, y, z, a, b, c):  # type: ignore[no-untyped-def]
+    """``R(q)^T v``: a world vector ``(a, b, c)`` in the body frame."""
+    pw, px, py, pz = multiply(w, -x, -y, -z, 0.0, a, b, c)
+    _, bx, by, bz = multiply(pw, px, py, pz, w, x, y, z)
+    return bx, by, bz
+
+
+@inline
 def from_thrust_direction(ux, uy, uz):  # type: ignore[no-untyped-def]
     """Zero-yaw attitude whose third axis is the unit vector u (paper section 2.3).
 

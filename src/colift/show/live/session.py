@@ -459,6 +459,8 @@ def _signals(flight: Flight) -> dict[str, Array]:
         values = getattr(bus, name)
         found[name] = np.full((n, *values.shape[1:]), np.nan)
         found[name][drones] = values
+    found["reeled"] = np.full(n, np.nan)
+    found["reeled"][drones] = bus.reeled[:, 0]
     allocations = flight.last_allocations
     # A silent allocation has no duration; the longest of the others counts.
     worst = np.fmax.reduce(allocations, axis=0, initial=np.nan)

@@ -41,8 +41,10 @@ SHOWN = (
     "tensions",
     "desired_tensions",
     "thrusts",
+    "reeled",
 )
-"""Signals of the page that are rows of the recording; ``external`` is the force on the load."""
+"""Signals of the page that are rows of the recording; ``external`` is the force on the load,
+``reeled`` only how much cable winches have paid out."""
 
 
 def payload(
@@ -134,6 +136,7 @@ def _signals(recording: Recording) -> dict[str, Array]:
         "reference": recording["reference"][:, 0],
         "load": recording["load"][:, 0],
         "external": recording["external_forces"][:, -1],
+        "reeled": recording["reeled"][:, :, 0],
     }
     return {name: special[name] if name in special else recording[name] for name in SHOWN}
 

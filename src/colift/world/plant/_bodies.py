@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from colift.kernel.jit import inline, kernel
 from colift.kernel.load import ends_of
 from colift.kernel.math import quaternion
+from colift.kernel.math.winch import paid_out
 from colift.part import Places, Vector
 from colift.team import Ground, Team
 from colift.team.geometry import min_norm_tensions
@@ -59,6 +60,10 @@ def free_motion(n, y, thrusts, torques, external, params, dy):  # type: ignore[n
         dy[o + 10] = (torques[i, 0] - (jz - jy) * q * r) / jx
         dy[o + 11] = (torques[i, 1] - (jx - jz) * r * p) / jy
         dy[o + 12] = (torques[i, 2] - (jy - jx) * p * q) / jz
+
+
+STAGES = (0.0, 0.5, 0.5, 1.0)
+"""When the slopes of :func:`runge_kutta` are due, over its step."""
 
 
 @inline
@@ -106,6 +111,14 @@ def unit(x, y, z):  # type: ignore[no-untyped-def]
 def line(y, o):  # type: ignore[no-untyped-def]
     """Unit vector and distance to the load from the body whose state begins at ``o``."""
     return unit(y[0] - y[o], y[1] - y[o + 1], y[2] - y[o + 2])
+
+
+@inline
+def wind(n, winches, t, params, lengths, rates, bends):  # type: ignore[no-untyped-def]
+    """Lengths of the cables at a time (s), m, and two derivatives."""
+    for i in range(n):
+        more, rates[i], bends[i] = paid_out(winches, i, t)
+        lengths[i] = params[MASS + BODY * i + 1] + more
 
 
 @inline
@@ -160,6 +173,7 @@ class BodiesPart(PlantPart):
     """Base of the plants whose memory begins with the state of load and drones."""
 
     observe = observe
+    reels: ClassVar[str] = ""
     anchored: ClassVar[bool] = True
     """Whether the memory ends with what contact with the ground remembers."""
 

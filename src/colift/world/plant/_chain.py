@@ -24,6 +24,7 @@ from pydantic import Field
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.columns import column
+from colift.kernel.math.winch import turning
 from colift.part import Places, Vector
 from colift.team import Team
 from colift.world.plant._bodies import (
@@ -31,6 +32,7 @@ from colift.world.plant._bodies import (
     DRONE,
     LOAD,
     MASS,
+    STAGES,
     BodiesPart,
     catch_impulse,
     free_motion,
@@ -39,6 +41,7 @@ from colift.world.plant._bodies import (
     raise_peaks,
     runge_kutta,
     state_size,
+    wind,
 )
 from colift.world.plant._contact import (
     P,
@@ -59,7 +62,7 @@ CABLES = Layout(drone={"stiffness": 1, "damping": 1, "together": 1, "bead_mass":
 by the mean rate of its cable's segments."""
 C = CABLES.at
 CABLE: int = C.width
-SCRATCH = Layout(drone={"T": 1, "parting": 1})
+SCRATCH = Layout(drone={"T": 1, "parting": 1, "length": 1, "rate": 1, "bend": 1})
 """In columns, behind the state and three of its size for the integrator."""
 SPANS = SCRATCH.spans
 COURANT = 1.5
@@ -95,9 +98,27 @@ def rest(y, o, w, params, dy):  # type: ignore[no-untyped-def]
 
 @inline
 def derivative(  # type: ignore[no-untyped-def]
-    n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, T, forces, dy
+    n,
+    k,
+    y,
+    thrusts,
+    torques,
+    external,
+    attached,
+    longest,
+    anchors,
+    w,
+    params,
+    lengths,
+    rates,
+    T,
+    forces,
+    dy,
 ):
-    """Time derivative of the state; fills the tensions ``T`` at the load's end and the ground's ``forces``."""
+    """Time derivative of the state; fills the tensions ``T`` at the load's end and the ground's ``forces``.
+
+    Cables have these ``lengths``, which grow at ``rates``: what is wound up stretches no more.
+    """
     free_motion(n, y, thrusts, torques, external, params, dy)
     grounded = params[P.ground] > 0.0
     if grounded:
@@ -106,10 +127,11 @@ def derivative(  # type: ignore[no-untyped-def]
     wind = cables + CABLE * n
     for i in range(n):
         c = cables + CABLE * i
-        stiffness, damping = params[c + C.stiffness], params[c + C.damping]
-        together, bead_mass = params[c + C.together], params[c + C.bead_mass]
+        stiffer = params[MASS + BODY * i + 1] / lengths[i]
+        stiffness, damping = stiffer * params[c + C.stiffness], stiffer * params[c + C.damping]
+        together, bead_mass = stiffer * params[c + C.together], params[c + C.bead_mass]
         drag = params[c + C.drag]
-        length = params[MASS + BODY * i + 1] / (k + 1)
+        length, growth = lengths[i] / (k + 1), rates[i] / (k + 1)
         for j in range(k):
             o = beads + BEAD * (k * i + j)
             dy[o], dy[o + 1], dy[o + 2] = y[o + 3], y[o + 4], y[o + 5]
@@ -127,7 +149,7 @@ def derivative(  # type: ignore[no-untyped-def]
             for j in range(k + 1):
                 b = beads + BEAD * (k * i + j) if j < k else 0
                 x, y_, z, d, rate = segment(y, a, b)
-                total += rate
+                total += rate - growth
                 least = min(least, d - length)
                 if j > 0:
                     bend += (x - px) ** 2 + (y_ - py) ** 2 + (z - pz) ** 2
@@ -144,7 +166,7 @@ def derivative(  # type: ignore[no-untyped-def]
                 b, mass_b = 0, params[0]
             x, y_, z, d, rate = segment(y, a, b)
             if d > length:
-                pull = max(0.0, stiffness * (d - length) + damping * rate + common)
+                pull = max(0.0, stiffness * (d - length) + damping * (rate - growth) + common)
                 fx, fy, fz = pull * x, pull * y_, pull * z
                 dy[a + 3] += fx / mass_a
                 dy[a + 4] += fy / mass_a
@@ -175,7 +197,7 @@ def derivative(  # type: ignore[no-untyped-def]
 
 
 @inline
-def note_catches(n, y, attached, T, params, parting, catch_impulses):  # type: ignore[no-untyped-def]
+def note_catches(n, y, attached, T, params, lengths, rates, parting, catch_impulses):  # type: ignore[no-untyped-def]
     """Keep how fast the ends of each slack cable part (-1 while taut), and the catch when they are its length apart.
 
     Beads pull a little before that: what counts is the speed before they did.
@@ -187,12 +209,13 @@ def note_catches(n, y, attached, T, params, parting, catch_impulses):  # type: i
         x, y_, z, d = line(y, o)
         if attached[i] == 0.0:
             parting[i] = 0.0
-        elif d > params[MASS + BODY * i + 1]:
+        elif d > lengths[i]:
             if parting[i] > 0.0:
                 catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, parting[i], params))
             parting[i] = -1.0
         else:
             along = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
+            along -= rates[i]
             free = T[i] == 0.0 or along <= 0.0
             parting[i] = max(along, 0.0 if free else parting[i])
 
@@ -213,6 +236,14 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     slope = memory[3 * size : 4 * size]
     T = column(memory, 4 * size, n, SPANS.T)
     parting = column(memory, 4 * size, n, SPANS.parting)
+    L, rates = column(memory, 4 * size, n, SPANS.length), column(memory, 4 * size, n, SPANS.rate)
+    bends = column(memory, 4 * size, n, SPANS.bend)
+    winches, moving = sees.winches, turning(n, sees.winches, now.time, dt)
+    wind(n, winches, now.time, params, L, rates, bends)
+    shortest = 1.0
+    for i in range(n):  # a shorter cable is stiffer
+        shortest = min(shortest, L[i] / params[MASS + BODY * i + 1])
+    longest *= math.sqrt(max(shortest, 1e-6))
     substeps = math.ceil(dt / longest)
     h = dt / substeps
     anchors, w, forces = anchors_of(memory, n), rate(h), writes.ground_forces
@@ -220,16 +251,19 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         for m in range(size):
             begin[m] = y[m]
         for stage in range(4):
+            if moving:
+                at = now.time + (substep + STAGES[stage]) * h
+                wind(n, winches, at, params, L, rates, bends)
             derivative(
-                n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, T, forces,
-                slope,
+                n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, L, rates,
+                T, forces, slope,
             )  # fmt: skip
             runge_kutta(stage, size, h, begin, slope, total, y)
             if stage > 0:
                 continue
             forces = spare_of(memory, n)
             raise_peaks(n, T, peak_tensions)
-            note_catches(n, begin, attached, T, params, parting, catch_impulses)
+            note_catches(n, begin, attached, T, params, L, rates, parting, catch_impulses)
             for i in range(n):
                 if substep == 0:
                     tensions[i] = T[i]

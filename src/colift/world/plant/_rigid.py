@@ -8,7 +8,7 @@ changes the drones by ``T_i alpha_i / m_i`` and the load by ``-sum_i T_i alpha_i
     (I + sum_i m_i alpha_i alpha_i^T / m_L) y = sum_i m_i b_i alpha_i
 
 Accelerations give the tensions (paper eqs. 1 to 5), velocities the impulses of a plastic jerk, lengths the
-projection that keeps momentum.
+projection that keeps momentum. Cables that winches pay out have lengths with two derivatives, which are taken from ``b``.
 """
 
 from __future__ import annotations
@@ -79,20 +79,21 @@ def lines(n, y, alpha, lengths):  # type: ignore[no-untyped-def]
 
 
 @inline
-def closing(n, y, alpha, b):  # type: ignore[no-untyped-def]
-    """Velocities at which the load moves away from the drones, along the cables."""
+def closing(n, y, alpha, rates, b):  # type: ignore[no-untyped-def]
+    """Velocities at which the load moves away from the drones, along the cables, less those at which they are paid out."""
     for i in range(n):
         o = LOAD + DRONE * i + 3
         b[i] = (
             alpha[3 * i] * (y[3] - y[o])
             + alpha[3 * i + 1] * (y[4] - y[o + 1])
             + alpha[3 * i + 2] * (y[5] - y[o + 2])
+            - rates[i]
         )
 
 
 @inline
-def demand(n, y, dy, alpha, b):  # type: ignore[no-untyped-def]
-    """Accelerations at which the distances would grow without cables; ``b`` holds the distances before."""
+def demand(n, y, dy, alpha, bends, b):  # type: ignore[no-untyped-def]
+    """Accelerations by which the distances would outgrow the cables if these did not pull; ``b`` holds the distances before."""
     for i in range(n):
         o = LOAD + DRONE * i + 3
         x, y_, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
@@ -100,40 +101,43 @@ def demand(n, y, dy, alpha, b):  # type: ignore[no-untyped-def]
         along = x * vx + y_ * vy + z * vz
         squared = vx * vx + vy * vy + vz * vz - along * along
         ax, ay, az = dy[3] - dy[o], dy[4] - dy[o + 1], dy[5] - dy[o + 2]
-        b[i] = squared / max(b[i], 1e-12) + x * ax + y_ * ay + z * az
+        b[i] = squared / max(b[i], 1e-12) + x * ax + y_ * ay + z * az - bends[i]
 
 
 @inline
-def derivative(n, y, thrusts, torques, external, held, anchors, w, params, T, alpha, b, forces, dy):  # type: ignore[no-untyped-def]
+def derivative(  # type: ignore[no-untyped-def]
+    n, y, thrusts, torques, external, held, anchors, w, params, bends, T, alpha, b, forces, dy
+):
     """Time derivative of the state under the held cables; fills the tensions ``T`` and the ground's ``forces``.
 
+    ``bends`` are the second derivatives of the cables' lengths.
     ``alpha`` (3 numbers a drone) and ``b`` (one) are for intermediate results.
     """
     free_motion(n, y, thrusts, torques, external, params, dy)
     if params[P.ground] > 0.0:
         touch(n, y, anchors, w, params, forces, dy)
     lines(n, y, alpha, b)
-    demand(n, y, dy, alpha, b)
+    demand(n, y, dy, alpha, bends, b)
     solve(n, alpha, b, held, params, T)
     pull(n, alpha, T, params, 3, dy)
 
 
 @inline
-def tighten(n, y, held, params, T, alpha, b):  # type: ignore[no-untyped-def]
+def tighten(n, y, held, params, lengths, T, alpha, b):  # type: ignore[no-untyped-def]
     """Pull the held drones back to their distance; ``b`` holds the distances before."""
     for i in range(n):
-        b[i] -= params[MASS + BODY * i + 1]
+        b[i] -= lengths[i]
     solve(n, alpha, b, held, params, T)
     pull(n, alpha, T, params, 0, y)
 
 
 @inline
-def project(n, y, held, params, T, alpha, b):  # type: ignore[no-untyped-def]
+def project(n, y, held, params, lengths, rates, T, alpha, b):  # type: ignore[no-untyped-def]
     """Pull the held drones back to their distance and the velocities across it; keep momentum."""
     normalise(n, y)
     lines(n, y, alpha, b)
-    tighten(n, y, held, params, T, alpha, b)
+    tighten(n, y, held, params, lengths, T, alpha, b)
     lines(n, y, alpha, b)
-    closing(n, y, alpha, b)
+    closing(n, y, alpha, rates, b)
     solve(n, alpha, b, held, params, T)
     pull(n, alpha, T, params, 3, y)

@@ -31,7 +31,8 @@ STEP_SIGNATURE = PORTS["plant"].signature
 
 ``tensions`` are those at the beginning of the step. From when ``attached`` is 0 a cable pulls nothing. ``peak_tensions``
 and ``catch_impulses`` are raised, never lowered, and ``slack_times`` grow: the loop sets peaks and impulses to zero after each
-recorded row. A cable that comes taut while its ends part with speed ``u`` has a catch of impulse ``u / (1 / m_i + 1 / m_L)``:
+recorded row. Cables are as long as the team's and what ``winches`` have paid out by then
+(:func:`colift.kernel.math.winch.paid_out`). A cable that comes taut while its ends part with speed ``u`` has a catch of impulse ``u / (1 / m_i + 1 / m_L)``:
 what stops drone and load, were nothing else to hold them.
 """
 
@@ -60,8 +61,16 @@ class PlantPart(Part):
 
     layer: ClassVar[str] = "plant"
     observe: ClassVar[Callable[..., Any]]
+    reels: ClassVar[str] = "its cables keep their lengths"
+    """Why winches cannot pay out its cables and take them in; empty where they can."""
+    roped: ClassVar[bool] = False
+    """Whether its cables have mass of their own; otherwise half of each cable's is its drone's and half the load's."""
     slackens: ClassVar[bool] = True
     """Whether its cables can go slack, and so be slack at the start."""
+
+    def team_of(self, bodies: Team, density: float) -> Team:
+        """The team that it is bound to, of bodies without and cables with this mass per length, kg/m."""
+        return bodies if self.roped or density == 0.0 else bodies.with_ropes(density)
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
         """Memory vector for the start state."""

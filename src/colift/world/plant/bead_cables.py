@@ -2,7 +2,7 @@
 
 Each bead carries one segment's mass, the drone and the load half a segment's each. Air drag acts across each
 segment, ``rho_air c_d d / 2`` per length times the squared speed (Morison's normal drag). A cut is at the load's end: the
-cable stays with its drone.
+cable stays with its drone. What the controllers are told of this mass is ``drones.cable_density``.
 """
 
 from __future__ import annotations
@@ -20,6 +20,12 @@ Speed = Annotated[float, Field(ge=-100.0, le=100.0)]
 
 class BeadCables(ChainPart):
     """Elastic cables with mass and air drag, in beads."""
+
+    roped = True
+    reels = (
+        "its ropes are beads of fixed mass: to pay out more of a rope with mass, mass would have to come from a drum, "
+        "which its drones do not have"
+    )
 
     beads: Annotated[int, Field(ge=1, le=64)] = 3
     """Beads per cable."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from colift.kernel.math.winch import paid_out, turning
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
@@ -26,6 +27,8 @@ SETTINGS = 4
 """Parameters after those of the bodies: time constant, damping ratio, impedance, substeps."""
 
 
+FINER = 20
+"""Steps in place of one while a winch turns: a tendon's limit stands still within each, and would pull in jerks."""
 GRAIN = 1e-3
 """Radius of what touches the ground, m; the plane lies as much lower."""
 FEET = ((1, 0), (-1, 0), (0, 1), (0, -1))
@@ -113,8 +116,11 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         return
     # MuJoCo would soften, without a word, a limit that its step cannot follow.
     substeps = max(int(params[-1]), math.ceil(2.0 * dt / params[-SETTINGS] - 1e-9))
+    if turning(n, sees.winches, now.time, dt):
+        substeps *= FINER
     model.opt.timestep = dt / substeps
     model.tendon_limited[:] = attached > 0.0
+    lengths = params[MASS + 1 : -SETTINGS : BODY]
     data.qpos[:] = state[scene.qpos]
     data.qvel[:] = state[scene.qvel]
     data.qacc_warmstart[:] = warm_start
@@ -125,6 +131,10 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     data.xfrc_applied[2:, :3] = external[:n]
     reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
     for substep in range(substeps):
+        at = now.time + substep * dt / substeps
+        wound = np.array([paid_out(sees.winches, i, at) for i in range(n)])
+        model.tendon_range[:, 1] = lengths + wound @ _ahead(params)
+        middle = [paid_out(sees.winches, i, at + 0.5 * dt / substeps) for i in range(n)]
         mujoco.mj_forward(model, data)
         pressed = _touching(scene, n)
         if substep == 0:
@@ -136,10 +146,11 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             tensions[:] = pulls
         np.maximum(peak_tensions, np.append(pulls, pulls.sum()), out=peak_tensions)
         slack_times[(pulls == 0.0) & (attached > 0.0)] += dt / substeps
-        holds, taut = attached > 0.0, data.ten_length > model.tendon_range[:, 1]
+        holds, taut = attached > 0.0, data.ten_length > lengths + wound[:, 0]
         np.maximum(catch_impulses, reduced * parting, out=catch_impulses, where=holds & taut)
-        parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity, 0.0), 0.0)
+        parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity - wound[:, 1], 0.0), 0.0)
         sinking = -np.append(data.qvel[5::6], data.qvel[2])
+        model.tendon_range[:, 1] = lengths + np.array(middle) @ _ahead(params)
         mujoco.mj_step(model, data)
         if model.ngeom:
             np.maximum(
@@ -152,6 +163,17 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if data.warning.number.any():
         mujoco.mj_resetData(model, data)
         state[:] = np.nan
+
+
+def _ahead(params: Vector) -> Vector:
+    """Shift of a tendon's limit by its length, rate and acceleration with which MuJoCo has the tendon follow a length that changes.
+
+    MuJoCo draws a tendon beyond its limit back by ``-b v - k r`` as if the limit stood still, with ``b = 2 / (d t)`` and
+    ``k = 1 / (d t^2 z^2)`` of impedance ``d``, time constant ``t`` and damping ratio ``z``.
+    """
+    time_constant, damping_ratio, impedance = params[-SETTINGS:-1]
+    scale = time_constant * damping_ratio**2
+    return np.array([1.0, 2.0 * scale, impedance * time_constant * scale])
 
 
 def _touching(scene: _Scene, n: int) -> NDArray[np.bool_]:

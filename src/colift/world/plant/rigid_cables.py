@@ -11,21 +11,24 @@ import numpy as np
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.columns import column
+from colift.kernel.math.winch import turning
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import (
     DRONE,
     LOAD,
+    STAGES,
     BodiesPart,
     raise_peaks,
     runge_kutta,
     state_size,
+    wind,
 )
 from colift.world.plant._contact import P, anchors_of, contact_size, rate, settle, spare_of
 from colift.world.plant._rigid import derivative, project
 from colift.world.plant.base import STEP_SIGNATURE
 
-SCRATCH = Layout(drone={"T": 1, "b": 1, "alpha": 3})
+SCRATCH = Layout(drone={"T": 1, "b": 1, "alpha": 3, "length": 1, "rate": 1, "bend": 1})
 """In columns, behind the state and three of its size for the integrator."""
 SPANS = SCRATCH.spans
 
@@ -45,10 +48,16 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     T = column(memory, 4 * size, n, SPANS.T)
     b = column(memory, 4 * size, n, SPANS.b)
     alpha = column(memory, 4 * size, n, SPANS.alpha)
+    L, rates = column(memory, 4 * size, n, SPANS.length), column(memory, 4 * size, n, SPANS.rate)
+    bends = column(memory, 4 * size, n, SPANS.bend)
     anchors, w, forces = anchors_of(memory, n), rate(dt), writes.ground_forces
     for k in range(size):
         begin[k] = y[k]
+    winches, moving = sees.winches, turning(n, sees.winches, now.time, dt)
+    wind(n, winches, now.time, params, L, rates, bends)
     for stage in range(4):
+        if moving:
+            wind(n, winches, now.time + STAGES[stage] * dt, params, L, rates, bends)
         derivative(
             n,
             y,
@@ -59,6 +68,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             anchors,
             w,
             params,
+            bends,
             T,
             alpha,
             b,
@@ -71,7 +81,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 tensions[i] = T[i]
             raise_peaks(n, T, peak_tensions)
             forces = spare_of(memory, n)
-    project(n, y, attached, params, T, alpha, b)
+    project(n, y, attached, params, L, rates, T, alpha, b)
     if params[P.ground] > 0.0:
         settle(n, begin, y, w, params, anchors, writes.touch_speeds)
     for i in range(n):

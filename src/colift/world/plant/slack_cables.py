@@ -17,6 +17,7 @@ import numpy as np
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.columns import column
+from colift.kernel.math.winch import turning
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import (
@@ -24,6 +25,7 @@ from colift.world.plant._bodies import (
     DRONE,
     LOAD,
     MASS,
+    STAGES,
     BodiesPart,
     catch_impulse,
     free_motion,
@@ -31,6 +33,7 @@ from colift.world.plant._bodies import (
     raise_peaks,
     runge_kutta,
     state_size,
+    wind,
 )
 from colift.world.plant._contact import (
     P,
@@ -62,7 +65,12 @@ NEAR = 1e-11
 SLOW = 1e-5
 """Speed along the cable that counts as none, m/s: what one catch throws off another bounces ever faster."""
 
-SCRATCH = Layout(drone={"T": 1, "b": 1, "taut": 1, "held": 1, "alpha": 3, "parting": 1})
+SCRATCH = Layout(
+    drone={
+        "T": 1, "b": 1, "taut": 1, "held": 1, "alpha": 3, "length": 1, "rate": 1, "bend": 1,
+        "parting": 1,
+    }
+)  # fmt: skip
 """In columns, behind the state and three of its size for the integrator; behind the ``parting`` speeds the time since a catch."""
 S, SPANS = SCRATCH.at, SCRATCH.spans
 
@@ -109,7 +117,7 @@ CONTACT = 0.01
 
 
 @inline
-def note_parting(n, y, dt, parting):  # type: ignore[no-untyped-def]
+def note_parting(n, y, dt, rates, parting):  # type: ignore[no-untyped-def]
     """Keep how fast the ends of each slack cable part, unless a burst of catches is on; last, the time since a catch.
 
     What stops a drone and the load is judged by the speed before any cable of the burst was caught: which of them
@@ -121,22 +129,26 @@ def note_parting(n, y, dt, parting):  # type: ignore[no-untyped-def]
     for i in range(n):
         o = LOAD + DRONE * i
         x, y_, z, _ = line(y, o)
-        parting[i] = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
+        parting[i] = (
+            x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5]) - rates[i]
+        )
 
 
 @inline
-def catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses):  # type: ignore[no-untyped-def]
+def catch(  # type: ignore[no-untyped-def]
+    n, y, attached, slow, params, lengths, rates, taut, held, T, alpha, b, parting, catch_impulses
+):
     """Find the taut cables, those at full length that shorten at most ``slow``; impulses stop any that grow."""
     lines(n, y, alpha, b)
     beyond = False
     for i in range(n):
-        over = b[i] - params[MASS + BODY * i + 1]
+        over = b[i] - lengths[i]
         taut[i] = 1.0 if attached[i] > 0.0 and over > -NEAR else 0.0
         beyond = beyond or (taut[i] > 0.0 and over > 0.5 * NEAR)
     if beyond:  # or a cable that is not held would overrun again at once
-        tighten(n, y, taut, params, T, alpha, b)
+        tighten(n, y, taut, params, lengths, T, alpha, b)
         lines(n, y, alpha, b)
-    closing(n, y, alpha, b)
+    closing(n, y, alpha, rates, b)
     jerk = False
     for i in range(n):
         if taut[i] > 0.0 and b[i] > SLOW:
@@ -147,7 +159,7 @@ def catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_
     if jerk:
         complementarity(n, alpha, b, taut, params, held, T)
         pull(n, alpha, T, params, 3, y)
-        closing(n, y, alpha, b)
+        closing(n, y, alpha, rates, b)
     for i in range(n):
         if b[i] < -slow:
             taut[i] = 0.0
@@ -170,18 +182,28 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     taut, held = column(memory, 4 * size, n, SPANS.taut), column(memory, 4 * size, n, SPANS.held)
     alpha, parting = column(memory, 4 * size, n, SPANS.alpha), memory[4 * size + n * S.parting :]
     anchors, w, spare = anchors_of(memory, n), rate(dt), spare_of(memory, n)
-    note_parting(n, y, dt, parting)
+    L, rates = column(memory, 4 * size, n, SPANS.length), column(memory, 4 * size, n, SPANS.rate)
+    bends = column(memory, 4 * size, n, SPANS.bend)
+    winches, moving = sees.winches, turning(n, sees.winches, now.time, dt)
+    wind(n, winches, now.time, params, L, rates, bends)
+    note_parting(n, y, dt, rates, parting)
     left = dt
     for event in range(EVENTS * n + 1):
         last = event == EVENTS * n
         slow = math.inf if last else SLOW
-        catch(n, y, attached, slow, params, taut, held, T, alpha, b, parting, catch_impulses)
+        since = now.time + dt - left
+        if moving:
+            wind(n, winches, since, params, L, rates, bends)
+        catch(
+            n, y, attached, slow, params, L, rates, taut, held, T, alpha, b, parting,
+            catch_impulses,
+        )  # fmt: skip
         free_motion(n, y, thrusts, torques, external, params, slope)
         if params[P.ground] > 0.0:
             forces = writes.ground_forces if event == 0 else spare
             touch(n, y, anchors, w, params, forces, slope)
         lines(n, y, alpha, b)
-        demand(n, y, slope, alpha, b)
+        demand(n, y, slope, alpha, bends, b)
         complementarity(n, alpha, b, taut, params, held, T)
         raise_peaks(n, T, peak_tensions)
         if event == 0:
@@ -194,20 +216,22 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             for k in range(size):
                 y[k] = begin[k]
             for stage in range(5):  # the fifth looks at the tensions of the end
+                if moving:
+                    part = STAGES[stage] if stage < 4 else 1.0
+                    wind(n, winches, since + part * h, params, L, rates, bends)
                 derivative(
-                    n, y, thrusts, torques, external, held, anchors, w, params, T, alpha, b, spare,
-                    slope,
+                    n, y, thrusts, torques, external, held, anchors, w, params, bends, T, alpha, b,
+                    spare, slope,
                 )  # fmt: skip
                 if stage < 4:
                     runge_kutta(stage, size, h, begin, slope, total, y)
             happened = False
             for i in range(n):
-                L = params[MASS + BODY * i + 1]
                 if held[i] > 0.0:
                     m = params[MASS + BODY * i]
                     happened = happened or T[i] < -1e-9 * m * max(1.0, abs(b[i]))
                 elif attached[i] > 0.0:
-                    happened = happened or line(y, LOAD + DRONE * i)[3] > L + NEAR
+                    happened = happened or line(y, LOAD + DRONE * i)[3] > L[i] + NEAR
             if last:
                 break
             if happened:
@@ -217,7 +241,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             else:
                 low = h
             h = high if trial == BISECTIONS - 1 else 0.5 * (low + high)
-        project(n, y, held, params, T, alpha, b)
+        project(n, y, held, params, L, rates, T, alpha, b)
         if params[P.ground] > 0.0:
             settle(n, begin, y, w, params, anchors, writes.touch_speeds)
         for i in range(n):

@@ -12,7 +12,7 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import fifo, noise, quaternion
 from colift.part import Vector, timing_problems
 from colift.team import Team
-from colift.world.sensing.base import SIGNATURE, SensingPart
+from colift.world.sensing.base import SIGNATURE, SensingPart, felt
 
 Size = Annotated[float, Field(ge=0.0, le=10.0)]
 Degrees = Annotated[float, Field(ge=0.0, le=45.0)]
@@ -27,11 +27,15 @@ _WIDTHS = {
     "tracking": 6,
     "attitude": 4,
     "rates": 3,
+    "specific_force": 3,
 }  # numbers in one sample, before its step
-_QUANTITIES = ("load_position", "load_velocity", "position", "velocity", "attitude", "rates")
-_CHANNELS = 16  # of random numbers per body: 0-6 the noise, two axes in each; 7-10 dropouts
+_QUANTITIES = (
+    "load_position", "load_velocity", "position", "velocity", "attitude", "rates", "specific_force",
+)  # fmt: skip
+_CHANNELS = 16  # of random numbers per body: 0-6 and 11-12 the noise, two axes in each; 7-10 and 13 dropouts
 _TURNING, _SPINNING = 3, 5  # the first of attitude and rates; tracking has 0-2
-_LOAD_LOST, _TRACKING_LOST, _ATTITUDE_LOST, _RATES_LOST = 7, 8, 9, 10
+_FEELING = 11
+_LOAD_LOST, _TRACKING_LOST, _ATTITUDE_LOST, _RATES_LOST, _FEELING_LOST = 7, 8, 9, 10, 13
 
 SENSOR = Layout(team={"period": 1, "delay": 1, "dropout": 1, "slots": 1, "samples": 1})
 """``slots``: samples that may be on their way; ``samples``: where they stand, as in :data:`MEMORY`."""
@@ -41,17 +45,18 @@ PARAMS = Layout(
     team={
         **{f"{name}_sensor": SENSOR.size(0) for name in _WIDTHS},
         **{f"{name}_error": QUANTITY.size(0) for name in _QUANTITIES},
-        "first_row": 1, "row": 1,
+        "first_row": 1, "row": 1, "g": 1,
     }
 )  # fmt: skip
 """``first_row`` and ``row``: begin and length of the drones' rows in memory."""
 MEMORY = Layout(
     team={"load_started": 1, "load_bias": 6, "load_samples": None},
     drone={
-        "started": 1, "bias": 12, "tracking_samples": None, "attitude_samples": None,
-        "rates_samples": None,
+        "started": 1, "bias": 15, "before": 3, "felt": 3, "steps": 1, "tracking_samples": None,
+        "attitude_samples": None, "rates_samples": None, "specific_force_samples": None,
     },
 )  # fmt: skip
+"""Velocity a step ``before``; sum of what was ``felt`` in the ``steps`` since a sample was taken of it."""
 P, S, Q, M = PARAMS.at, SENSOR.at, QUANTITY.at, MEMORY.at
 _NEXT = QUANTITY.size(0)  # from one quantity's numbers to those of the next
 
@@ -115,6 +120,7 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     measured_load, measured_positions = writes.measured_load, writes.measured_positions
     measured_velocities, measured_attitudes = writes.measured_velocities, writes.measured_attitudes
     measured_rates, ages = writes.measured_rates, writes.measured_ages
+    forces, force_ages = writes.measured_specific_forces, writes.specific_force_ages
     n = positions.shape[0]
     # The load's noise is that of body 0, a drone's that of body i + 1.
     fresh = memory[M.load_started] == 0.0
@@ -144,6 +150,11 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if fresh:
             memory[o + M.started] = 1.0
             _draw_biases(memory, bias, 12, key, channel, params, P.position_error)
+            _draw_biases(
+                memory, bias + 12, 3, key, channel + _FEELING, params, P.specific_force_error
+            )
+            for k in range(3):
+                memory[o + M.before + k] = velocities[i, k]
 
         sensor, lost = P.tracking_sensor, channel + _TRACKING_LOST
         at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 6)
@@ -202,19 +213,45 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         else:
             ages[i, 2] += dt
 
+        force = felt(i, velocities, attitudes, memory, o + M.before, params[P.g], dt)
+        memory[o + M.steps] += 1.0
+        for k in range(3):
+            memory[o + M.felt + k] += force[k]
+        sensor, lost = P.specific_force_sensor, channel + _FEELING_LOST
+        at, number = _place(fresh, step, dt, key, lost, params, sensor, memory, o, 3)
+        if at >= 0:
+            for k in range(3):
+                mean = memory[o + M.felt + k] / memory[o + M.steps]
+                memory[at + k] = mean + memory[bias + 12 + k]
+                memory[o + M.felt + k] = 0.0
+            memory[o + M.steps] = 0.0
+            _disturb(
+                memory, at, 3, key, number, channel + _FEELING, params,
+                P.specific_force_error + Q.noise,
+            )  # fmt: skip
+        at = _arrived(step, params, sensor, memory, o, 3)
+        if at >= 0 and stuck[i] == 0.0:
+            for k in range(3):
+                forces[i, k] = memory[at + k]
+            force_ages[i] = (step - memory[at + 3]) * dt
+        else:
+            force_ages[i] += dt
+
 
 class Noisy(SensingPart):
-    """Motion capture of load and drones, attitude and rates from each drone's own computer.
+    """Motion capture of load and drones; attitude, rates and specific force from each drone's own computer.
 
     Each sensor takes a sample every period, which is lost with the probability ``dropout`` and arrives after
     the delay; until then the last one stands. Each axis of a sample has white noise of the given standard
     deviation and a constant bias: three numbers are that bias, one is the standard deviation with which it is
-    drawn by the seed. Attitudes are turned by a small rotation about the body axes. Periods are whole multiples
+    drawn by the seed. Attitudes are turned by a small rotation about the body axes. An accelerometer's sample is
+    the mean since the one before, as of a sensor that integrates. Periods are whole multiples
     of ``timing.step``; delays are rounded to it, and are ``timing.delay`` where the mission has one.
 
     Defaults: camera systems err by up to 2 mm on moving objects (Merriaux et al., Sensors 17(7):1591, 2017)
     and answer in 6 to 7 ms at 200 Hz (Qualisys with ETH Zurich, 2011); gyroscopes of flight controllers
-    have some 0.01 deg/s per root Hz, to which vibration adds.
+    have some 0.01 deg/s per root Hz, to which vibration adds. Accelerometers such as Bosch's BMI088 have 0.017 m/s^2 in
+    100 Hz and an offset of 0.2 m/s^2 (data sheet): vibration adds to the one, calibration takes from the other.
     """
 
     kernel = _sense
@@ -233,6 +270,8 @@ class Noisy(SensingPart):
     """Degrees."""
     rates_noise: Size = 0.01
     """rad/s."""
+    specific_force_noise: Size = 0.2
+    """Of a sample, m/s^2."""
     load_position_bias: Bias = 0.0
     """World frame, m."""
     load_velocity_bias: Bias = 0.0
@@ -245,6 +284,8 @@ class Noisy(SensingPart):
     """Body frame, rad."""
     rates_bias: Bias = 0.0
     """Body frame, rad/s."""
+    specific_force_bias: Bias = 0.05
+    """Body frame, m/s^2."""
     load_period: Period = 0.005
     """Time between two samples of the load, s."""
     load_delay: Delay = 0.007
@@ -268,6 +309,12 @@ class Noisy(SensingPart):
     rates_delay: Delay = 0.001
     """s."""
     rates_dropout: Share = 0.0
+    """Share of the samples that is lost."""
+    specific_force_period: Period = 0.005
+    """s."""
+    specific_force_delay: Delay = 0.002
+    """s."""
+    specific_force_dropout: Share = 0.0
     """Share of the samples that is lost."""
 
     def _slots(self, sensor: str) -> int:
@@ -294,7 +341,7 @@ class Noisy(SensingPart):
             else:
                 size = getattr(self, f"{quantity}_noise")
             packed[f"{quantity}_error"] = QUANTITY.pack(0, noise=size, spread=spread, bias=fixed)
-        return PARAMS.pack(team.n, first_row=where.rows, row=where.width, **packed)
+        return PARAMS.pack(team.n, first_row=where.rows, row=where.width, g=team.gravity, **packed)
 
     def layout(self) -> Layout:
         queues = {name: fifo.size(self._slots(name), width + 1) for name, width in _WIDTHS.items()}
