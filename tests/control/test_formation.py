@@ -122,6 +122,13 @@ def test_heavy_drones_hold_a_light_load():
     assert float(metrics.compute(flight)["slack_time_s"]) == 0.0
 
 
+def test_a_light_load_on_long_cables_does_not_rock_its_drones():
+    """Cables that answer fast move heavy drones far, for what is misjudged of that very motion."""
+    body = {"mass": 20.0, "max_thrust": 370.0, "arm": 0.6, "count": 6, "cable_length": 14.5}
+    flight = fly(6, duration=20.0, drones=body, load={"mass": 1.8}, actuation={"kind": "motors"})
+    assert off(flight).max() < 0.02
+
+
 @pytest.mark.parametrize(("height", "band"), [(0.3, 9.0), (1.0, 9.0), (10.0, 7.0), (0.5, 3.0)])
 def test_pendulum_gains_place_the_four_poles(height, band):
     k1, k2, k3, k4 = pendulum_gains(G, height, band)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from colift.control.allocation.limits.hover import RESERVE
 from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
+from colift.record import metrics
 from terminal import colift
 
 WEAK = {
@@ -142,3 +144,29 @@ def test_wind_is_said_to_be_left_out():
     shown = colift("feasibility", "windy-spiral")
     assert shown.returncode == 0
     assert "disturbance.0 (wind)" in " ".join(shown.stdout.split())
+
+
+BLOWN = {
+    "name": "blown",
+    "load": {"mass": 0.5},
+    "drones": {"count": 1, "mass": 1.4, "max_thrust": 32.0, "arm": 0.2, "cable_length": 5.0},
+    "reference": {"kind": "hover"},
+    "disturbance": [
+        {"kind": "wind", "speed": 6.0}, {"kind": "dryden", "speed": 6.0},
+        {"kind": "drag", "load_area": 0.1},
+    ],
+}  # fmt: skip
+
+
+def test_gusts_that_swing_the_load_of_one_drone_are_refused_unless_that_is_allowed():
+    with pytest.raises(MissionError) as refused:
+        load_mission(BLOWN)
+    (problem,) = refused.value.problems
+    assert problem.path == "disturbance"
+    found = re.search(r"gusts swing the load below 1 drones? by about ([0-9.]+) m", problem.message)
+    assert found
+    # Steady wind leans it, too, but that is made up for.
+    load_mission({**BLOWN, "disturbance": [BLOWN["disturbance"][0], BLOWN["disturbance"][2]]})
+    mission = load_mission({**BLOWN, "criteria": {"tracking_max_m": {"max": 5.0}}})
+    error = np.linalg.norm(metrics.tracking_error(Flight(mission).run()), axis=1)
+    assert error[len(error) // 2 :].max() == pytest.approx(float(found[1]), rel=0.5)

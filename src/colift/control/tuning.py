@@ -31,6 +31,9 @@ SNAP = 0.08
 TILTING, YAWING = 1.1, 0.9
 """Most torque asked for, over what all rotors between hover and their nearer limit give: a little more is clipped by the mixer."""
 
+MISJUDGED = 0.05
+"""Share of the force that moves the drones which may be taken for one on the load."""
+
 LEAN = 0.5
 """Most that the wanted cable directions answer to a load error: metres that the drones move for a metre."""
 
@@ -116,6 +119,16 @@ def turning(team: Team) -> tuple[Vector, Vector]:
     lever = np.where(team.rotors > 4, 0.5, math.sqrt(0.5)) * team.arms
     tilting = TILTING * lever * spare / team.inertias[:, :2].max(axis=1)
     return tilting, YAWING * team.torque_ratios * spare / team.inertias[:, 2]
+
+
+def sway(team: Team) -> float:
+    """How fast the cables may answer what is observed of the load, 1/s.
+
+    A motion x of all drones at the rate r asks for ``M r^2 x``. The share of it that is misjudged looks like a force on the
+    load and leans the cables, which moves their drones by ``L / (m_L g)`` of it: by no more than x.
+    """
+    heavy = MISJUDGED * float(team.masses.sum()) * float(team.cable_lengths.mean())
+    return math.sqrt(team.load_mass * max(team.gravity, 1e-3) / heavy)
 
 
 def shorter(field: str, told: float, other: str, real: float) -> Iterable[tuple[str, str]]:

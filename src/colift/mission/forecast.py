@@ -26,6 +26,9 @@ MOST_THRUST = 0.87
 MOST_LEAN = math.radians(70.0)
 """Lean of the load in the wind beyond which three cables or more cannot all stay taut."""
 
+SWINGS = 0.9
+"""How far gusts swing the load of one or two drones, over by how much more than the steady wind they would lean it."""
+
 
 @dataclass(frozen=True)
 class Forecast:
@@ -43,6 +46,8 @@ class Forecast:
         Of the force that holds the load, from the vertical, rad.
     offset : float
         By how much the load hangs aside of a place straight below its drones, m.
+    swing : float
+        By how much of that gusts change it, m.
 
     """
 
@@ -51,6 +56,7 @@ class Forecast:
     limits: Array
     lean: float
     offset: float
+    swing: float
 
     @property
     def thrust(self) -> float:
@@ -58,7 +64,7 @@ class Forecast:
         return float(np.max(self.thrusts / self.limits))
 
     def problems(self, team: Team, allowed: float) -> Iterable[tuple[str, str]]:
-        """Why this cannot be flown, by the layer at fault; ``allowed`` is the most error of the load's place, m."""
+        """Why this cannot be flown, by the layer at fault; ``allowed`` is the most error of the load's place, m; inf where none is given."""
         speed = float(np.linalg.norm(self.wind))
         if speed == 0.0:
             return
@@ -81,6 +87,13 @@ class Forecast:
                 f"{speed:.3g} m/s of wind blow the load {self.offset:.3g} m aside before {team.n} drones have learnt of it, more than "
                 f"the {allowed:.3g} m that criteria.tracking_max_m allows",
             )
+        usual = max(0.1, 0.1 * float(team.cable_lengths.max()))
+        if team.n <= 2 and math.isinf(allowed) and SWINGS * self.swing > usual:
+            yield (
+                "disturbance",
+                f"gusts swing the load below {team.n} drones by about {SWINGS * self.swing:.3g} m, more than a tenth of a cable or {usual:.3g} m; "
+                "a criteria.tracking_max_m that you set takes the place of this bound",
+            )
 
 
 def forecast(
@@ -92,24 +105,27 @@ def forecast(
     """Judge a team that hovers as its allocator has it; ``limits`` (n,) is the thrust of each drone, N."""
     parts = [each for each in disturbances if isinstance(each, DisturbancePart)]
     wind = np.sum([np.zeros(3), *(each.strongest_wind() for each in parts)], axis=0)
-    pushes = np.zeros((team.n + 1, 3))
-    if wind.any():
-        for part in parts:
-            if part.feels_wind:
-                pushes += _pushes(team, hover, part, wind)
+    steady = np.sum([np.zeros(3), *(p.strongest_wind() for p in parts if p.steady)], axis=0)
+    pushes = _pushes(team, hover, parts, wind)
     needed = team.hover_forces(hover.tensions, hover.directions)
     shares = hover.tensions / max(float(hover.tensions.sum()), 1e-300)
     across = np.hypot(needed[:, 0], needed[:, 1]) + np.hypot(pushes[:-1, 0], pushes[:-1, 1])
     across += shares * math.hypot(pushes[-1, 0], pushes[-1, 1])
     up = needed[:, 2] - np.minimum(pushes[:-1, 2] + shares * pushes[-1, 2], 0.0)
     weight = max(team.load_mass * team.gravity, 1e-300)
-    lean = math.atan2(math.hypot(pushes[-1, 0], pushes[-1, 1]), weight)
-    offset = float(team.cable_lengths.max()) * math.tan(lean)
-    return Forecast(wind, np.hypot(up, across), limits, lean, offset)
+    longest = float(team.cable_lengths.max())
+    offset, always = (
+        longest * math.hypot(push[-1, 0], push[-1, 1]) / weight
+        for push in (pushes, _pushes(team, hover, parts, steady))
+    )
+    lean = math.atan(offset / longest)
+    return Forecast(wind, np.hypot(up, across), limits, lean, offset, max(offset - always, 0.0))
 
 
-def _pushes(team: Team, hover: Allocation, part: DisturbancePart, wind: Array) -> Array:
+def _pushes(team: Team, hover: Allocation, parts: Sequence[DisturbancePart], wind: Array) -> Array:
     """Forces (n+1, 3) of a wind on the bodies of a team at rest, N."""
+    if not wind.any():
+        return np.zeros((team.n + 1, 3))
     signals: Mapping[str, Any] = {
         "load": np.zeros((2, 3)),
         "ends": np.zeros((team.n, 2, 3)),
@@ -123,5 +139,9 @@ def _pushes(team: Team, hover: Allocation, part: DisturbancePart, wind: Array) -
         "wind": np.array(wind),
         "external_forces": np.zeros((team.n + 1, 3)),
     }
-    writes, _ = part.call(team, part.memory(team), **signals)
-    return np.asarray(writes.external_forces)
+    found = np.zeros((team.n + 1, 3))
+    for part in parts:
+        if part.feels_wind:
+            writes, _ = part.call(team, part.memory(team), **signals)
+            found += writes.external_forces
+    return found

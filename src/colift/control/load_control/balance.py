@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
-from colift.control.tuning import Delays
+from colift.control.tuning import Delays, sway
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.smooth import decay
@@ -20,9 +20,6 @@ PARAMS = Layout(team={"m": 1, "g": 1, "rate": 1, "tangent": 1})
 MEMORY = Layout(team={"push": 3})
 """Filtered external force on the load, N."""
 P, M = PARAMS.at, MEMORY.at
-
-MISJUDGED = 0.05
-"""Share of the force that moves the drones which may be taken for one on the load."""
 
 
 @kernel(SIGNATURE)
@@ -72,10 +69,7 @@ class Balance(LoadControlPart, Delays):
         g, L = max(team.gravity, 1e-3), float(team.cable_lengths.mean())
         if team.n <= 2:
             rate = min(rate, self.swing * math.sqrt(g / L))
-        # A motion x of the drones at the rate r asks for M r^2 x. What is misjudged of it looks like a force on the load, and leans
-        # the cables: their drones move by L / (m g) of it, by no more than x.
-        heavy = MISJUDGED * float(team.masses.sum()) * L
-        rate = min(rate, math.sqrt(team.load_mass * g / heavy))
+        rate = min(rate, sway(team))
         return PARAMS.pack(
             team.n, m=team.load_mass, g=team.gravity, rate=rate,
             tangent=math.tan(math.radians(self.max_lean_deg)),

@@ -12,7 +12,7 @@ from pydantic import Field
 from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
 from colift.control.position_control._cable import CABLE, lead, swing
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
-from colift.control.tuning import Delays, pendulum_gains
+from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import rotors
@@ -187,7 +187,7 @@ class Formation(PositionControlPart, Delays):
     stiffness: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
     """Gain of the position error over the square of that of the velocity error."""
     frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.55
-    """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop."""
+    """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
     max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
@@ -218,7 +218,7 @@ class Formation(PositionControlPart, Delays):
         k = self.gain * band
         return PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
-            band=band, frequency=self.frequency * band, thrust_filter=self.thrust_filter / band,
+            band=band, frequency=min(self.frequency * band, sway(team)), thrust_filter=self.thrust_filter / band,
             max_swing=self.max_swing, max_push=self.max_push,
             tangent=math.tan(math.radians(self.max_tilt_deg)), total=float(team.masses.sum()),
             m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,

@@ -27,6 +27,9 @@ class DisturbancePart(Part):
     feels_wind: ClassVar[bool] = False
     """Whether it turns wind into forces."""
 
+    steady: ClassVar[bool] = False
+    """Whether the wind that it makes stays as it is."""
+
     def strongest_wind(self) -> Vector:
         """What it adds to the wind (3,) at its strongest, world frame, m/s, as long as a team takes to answer it."""
         return np.zeros(3)

@@ -38,6 +38,7 @@ class Wind(DisturbancePart):
 
     kernel = _blow
     makes_wind: ClassVar[bool] = True
+    steady = True
 
     speed: Annotated[float, Field(ge=0.0, le=60.0)] = 5.0
     """Horizontal speed, m/s."""
