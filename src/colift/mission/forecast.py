@@ -91,7 +91,7 @@ class Forecast:
         if team.n <= 2 and math.isinf(allowed) and SWINGS * self.swing > usual:
             yield (
                 "disturbance",
-                f"gusts swing the load below {team.n} drones by about {SWINGS * self.swing:.3g} m, more than a tenth of a cable or {usual:.3g} m; "
+                f"gusts swing the load below {'one drone' if team.n == 1 else 'two drones'} by about {SWINGS * self.swing:.3g} m, more than a tenth of a cable or {usual:.3g} m; "
                 "a criteria.tracking_max_m that you set takes the place of this bound",
             )
 
