@@ -86,7 +86,8 @@ def test_actual_cables_keep_the_limit_less_a_margin_in_every_shipped_mission(mis
     settled = 2.0 if mission == "from-rest" else 0.0  # it starts with cables 7 degrees apart
     kept = flown.recording["directions"][flown.recording.time >= settled]
     least = flown.mission.allocation.min_angle_deg - safety.ACTUAL_MARGIN
-    assert np.degrees(np.nanmin(pairwise_angles(kept))) >= least
+    if kept.shape[1] > 1:
+        assert np.degrees(np.nanmin(pairwise_angles(kept))) >= least
     # Where an overload ends, the first cycle in balance may be cut short at the cap: its force is whole all the same.
     codes = flown.recording["allocator_status"]
     short = codes == Status.ITERATION_LIMIT

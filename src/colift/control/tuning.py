@@ -25,8 +25,8 @@ DOUBT = 0.25
 MOST_VELOCITY = 12.0
 """Most bandwidth of a velocity loop that moves cables, 1/s, however short the delay: they and the allocator have their own time."""
 
-SNAP = 0.08
-"""Error of the attitude from which on all the torque of the rotors is asked for at most, rad: less would be asked for by noise."""
+SNAP = 0.15
+"""Error of the attitude at which all the torque of the rotors is asked for, rad, at least: smaller ones are everyday."""
 
 TILTING, YAWING = 1.1, 0.9
 """Most torque asked for, over what all rotors between hover and their nearer limit give: a little more is clipped by the mixer."""

@@ -235,8 +235,6 @@ MU = 8.0
 """Weight of the alignment penalty over W^2 / n^3, for a load of weight W on n cables: a cone in which they stand wide apart."""
 RATE, SWINGING = 0.4, 1.0
 """Fastest turn of cables of 1 m, rad/s, which drones with real motors can follow; of one or two cables, on which a load swings."""
-FEW, HURRY = 8, 5.0 / 9.0
-"""Most cables that have all ``max_iterations`` steps in a call; share of them that more cables have."""
 ANY = 1e6
 """Force that nothing limits, N."""
 CLEAR = 1.2
@@ -318,8 +316,8 @@ class Safe(AllocatorPart):
     tolerance: Annotated[float, Field(ge=1e-10, le=1e-3)] = 1e-6
     """KKT residual, in shares of the load, at which the iteration stops."""
     max_iterations: Annotated[int, Field(ge=2, le=200)] = 36
-    """Most interior-point steps in one call, one whose matrix has to be built again counted half as well; of more than eight
-    cables, whose steps cost much, 5/9 of it. The next call goes on from there; limits hold after every step."""
+    """Most interior-point steps in one call, one whose matrix has to be built again counted half as well. The next call goes
+    on from there; limits hold after every step."""
 
     @model_validator(mode="after")
     def _ranges(self) -> Safe:
@@ -397,10 +395,6 @@ class Safe(AllocatorPart):
     def turn_rate(self, team: Team) -> float:
         """Fastest turn of a cable's direction, rad/s."""
         return float(self.settled("max_rate", team)[0])
-
-    def steps(self, n: int) -> int:
-        """Most steps in one call for n cables."""
-        return self.max_iterations if n <= FEW else max(2, round(HURRY * self.max_iterations))
 
     def penalty(self, team: Team) -> float:
         """Weight of the alignment penalty, N^2."""
@@ -556,7 +550,7 @@ class Safe(AllocatorPart):
             turning=self.turning,
             price=GIVE_WAY * float(weights.max()),
             tolerance=self.tolerance,
-            iterations=self.steps(n),
+            iterations=self.max_iterations,
             limits=newton.LIMITS if limited else newton.TILT - 1,
             g=team.gravity,
             cone=cone,

@@ -121,12 +121,10 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     model.opt.timestep = dt / substeps
     model.tendon_limited[:] = attached > 0.0
     lengths = params[MASS + 1 : -SETTINGS : BODY]
-    data.qpos[:] = state[scene.qpos]
-    data.qvel[:] = state[scene.qvel]
+    data.qpos[:], data.qvel[:] = state[scene.qpos], state[scene.qvel]
     data.qacc_warmstart[:] = warm_start
     controls = data.ctrl.reshape(n, 4)
-    controls[:, 0] = thrusts
-    controls[:, 1:] = torques
+    controls[:, 0], controls[:, 1:] = thrusts, torques
     data.xfrc_applied[1, :3] = external[n]
     data.xfrc_applied[2:, :3] = external[:n]
     reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
@@ -157,8 +155,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 writes.touch_speeds, sinking, out=writes.touch_speeds,
                 where=~pressed & _touching(scene, n),
             )  # fmt: skip
-    state[scene.qpos] = data.qpos
-    state[scene.qvel] = data.qvel
+    state[scene.qpos], state[scene.qvel] = data.qpos, data.qvel
     warm_start[:] = data.qacc_warmstart
     if data.warning.number.any():
         mujoco.mj_resetData(model, data)

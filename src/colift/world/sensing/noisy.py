@@ -310,7 +310,7 @@ class Noisy(SensingPart):
     """s."""
     rates_dropout: Share = 0.0
     """Share of the samples that is lost."""
-    specific_force_period: Period = 0.005
+    specific_force_period: Period = 0.01
     """s."""
     specific_force_delay: Delay = 0.002
     """s."""
