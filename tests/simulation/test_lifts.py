@@ -18,7 +18,7 @@ ALL = [
 ]  # fmt: skip
 RELEASED = [Phase.RELEASE if phase == Phase.LAND else phase for phase in ALL]
 NOISY = {"timing.delay": 0.02, "sensing.kind": "noisy", "estimation.kind": "predictor"}
-SHORT = {"reference.position": [0.0, 0.0, 0.4], "supervision.fly": 0.5, "timing.duration": 40.0}
+SHORT = {"reference.position": [0.0, 0.0, 0.4], "supervision.fly": 0.5, "timing.duration": 45.0}
 
 
 def fly(name="take-off-and-land", **changes):
@@ -222,12 +222,12 @@ def test_a_short_way_aside_is_no_jolt():
 
 def test_lengths_found_in_flight_and_wound_meanwhile_are_counted_once():
     """Cables measured in the air are hooked again, and taken in while the load is being lifted."""
-    wound = [{"at": 19.5, "field": "drones.cable_length", "value": 0.7, "rate": 0.4}]
+    wound = [{"at": 20.0, "field": "drones.cable_length", "value": 0.7, "rate": 0.4}]
     changes = {
         "start.on_ground": False, "supervision.kind": "lift", "truth.cable_length_factor": 1.05,
         "supervision.set_down": [[0.0, 0.0], [0.0, 0.0]], "events": wound,
     }  # fmt: skip
-    run = colift.run("take-off-and-land", overrides={**SHORT, **changes, "timing.duration": 24.2})
+    run = colift.run("take-off-and-land", overrides={**SHORT, **changes, "timing.duration": 24.6})
     r = run.recording
     again = (r["phase"][:, 0] == Phase.FLY) & (r.time > 1.0)
     assert phases(run) == [Phase.FLY, *ALL[6:10], *ALL[2:6]]
