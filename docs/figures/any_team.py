@@ -12,6 +12,7 @@ import importlib.util
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "any_team.py"
 TEAMS = {"one drone": (1,), "two": (2,), "three to eight": tuple(range(3, 9))}
 
 
+@cache
 def _benchmark() -> Any:
     spec = importlib.util.spec_from_file_location("any_team_benchmark", BENCHMARK)
     assert spec is not None

@@ -48,12 +48,13 @@ WAYS: dict[str, Overrides] = {
 }
 
 LIGHT: Overrides = {"truth.load_mass_factor": 0.5}
+WIDE = {"observation.total": 1.2, "observation.own": 1.2}
 EXACT = {f"sensing.{name}": value for name, value in stress.EXACT.items()}
 SENSORS_AND_GAINS: dict[str, Overrides] = {
     "as they are": {},
     "exact": EXACT,
-    "wider: `observation.total = 1`": {"observation.total": 1.0},
-    "exact and wider": {**EXACT, "observation.total": 1.0},
+    "wider: `observation.total` and `own` 1.2": WIDE,
+    "exact and wider": {**EXACT, **WIDE},
 }
 """Whether better sensors would serve the observers."""
 

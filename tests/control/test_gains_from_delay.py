@@ -86,6 +86,8 @@ def test_no_loop_asks_for_more_than_the_rotors_turn():
     rate = part.bandwidths(slow).rate
     assert rate < part.bandwidths(TEAM).rate
     assert 0.25 * rate**2 * SNAP == pytest.approx(turning(slow)[0].min())
+    weightless = Team.uniform(2, max_thrust=10.0, arm=0.01, gravity=0.0)
+    assert part.bandwidths(weightless) == part.bandwidths(TEAM)
 
 
 # ---------------------------------------------------------------- the attitude in closed loop

@@ -75,11 +75,6 @@ class Delays(Part):
             found["lag"] = mission.actuation.motor_lag()
         return found | super().declared(mission)
 
-    def uncertain(self) -> float:
-        """Time between a motion and the answer to it that nothing makes up for, s."""
-        share = DOUBT if self.predicted else 1.0
-        return share * (self.delay + self.lag) + 0.5 * self.period
-
     def bandwidths(self, team: Team) -> Bandwidths:
         """The rule.
 
@@ -91,7 +86,8 @@ class Delays(Part):
         sees ``tau`` and the lag ``1 / w`` of an attitude whose wanted rate is fed forward, and is bounded; position again
         a quarter.
         """
-        tau = self.uncertain()
+        share = DOUBT if self.predicted else 1.0
+        tau = share * (self.delay + self.lag) + 0.5 * self.period
         rate = (0.5 * math.pi - RATE_MARGIN) / tau
         least = float(np.min(np.nan_to_num(turning(team)[0], nan=math.inf)))
         if math.isfinite(least):
@@ -111,11 +107,11 @@ class Delays(Part):
 def turning(team: Team) -> tuple[Vector, Vector]:
     """Angular accelerations (n,) that the rotors can give beside hover, in roll and pitch, and in yaw, rad/s^2.
 
-    NaN where thrust, arm or torque ratio are not known.
+    NaN where thrust, arm or torque ratio are not known, and without gravity, where nobody hovers.
     """
     hover = (team.masses + team.load_mass / team.n) * team.gravity
     spare = np.maximum(np.minimum(hover, team.max_thrusts - hover), 0.05 * hover)
-    spare = np.where(np.isfinite(team.max_thrusts), spare, math.nan)
+    spare = np.where(np.isfinite(team.max_thrusts) & (hover > 0.0), spare, math.nan)
     lever = np.where(team.rotors > 4, 0.5, math.sqrt(0.5)) * team.arms
     tilting = TILTING * lever * spare / team.inertias[:, :2].max(axis=1)
     return tilting, YAWING * team.torque_ratios * spare / team.inertias[:, 2]

@@ -91,8 +91,8 @@ class Forecast:
         if team.n <= 2 and math.isinf(allowed) and SWINGS * self.swing > usual:
             yield (
                 "disturbance",
-                f"gusts swing the load below {'one drone' if team.n == 1 else 'two drones'} by about {SWINGS * self.swing:.3g} m, more than a tenth of a cable or {usual:.3g} m; "
-                "a criteria.tracking_max_m that you set takes the place of this bound",
+                f"gusts swing the load below {'one drone' if team.n == 1 else 'two drones'} by about {SWINGS * self.swing:.3g} m, more than {usual:.3g} m, "
+                "a tenth of a cable or 0.1 m; criteria.tracking_max_m, where it is given, takes the place of this bound",
             )
 
 

@@ -22,6 +22,7 @@ from pydantic import (
 
 from colift.catalogue import LAYERS
 from colift.errors import ColiftError
+from colift.kernel.math.smooth import soonest
 from colift.team import Ground as GroundBelow
 from colift.team import Team, vehicles
 from colift.team.geometry import Array, ring, ring_cone
@@ -398,8 +399,6 @@ EVENT_FIELDS = (
 )
 
 
-PEAK_SPEED, PEAK_BEND = 35.0 / 16.0, 84.0 * math.sqrt(5.0) / 25.0
-"""Of the septic way from rest to rest over one metre in one second (:func:`colift.kernel.math.smooth.rest_to_rest`)."""
 MOST_WINDING = 1.0
 """Most acceleration of a winch's cable, m/s^2."""
 
@@ -435,8 +434,7 @@ class Event(Section):
 
     def winding(self, change: float) -> float:
         """Time that a winch takes for this change of a cable's length (m), s."""
-        way = abs(change)
-        return max(PEAK_SPEED * way / self.rate, math.sqrt(PEAK_BEND * way / MOST_WINDING))
+        return float(soonest(abs(change), self.rate, MOST_WINDING))
 
 
 class Bound(Section):

@@ -174,8 +174,8 @@ class DelayAware(AttitudeControlPart, Delays):
     def params(self, team: Team) -> Vector:
         span, lag, coast = (self.delay, self.lag, self.coast) if self.predicted else (0.0, 0.0, 0.0)
         gains = self.bandwidths(team).rate * np.array([1.0, 1.0, YAW])
-        turning = self.settled("max_acceleration", team)
-        most = np.column_stack([turning, turning, self.settled("max_yaw_acceleration", team)])
+        tilting = self.settled("max_acceleration", team)
+        most = np.column_stack([tilting, tilting, self.settled("max_yaw_acceleration", team)])
         return PARAMS.pack(
             team.n, delay=span, lag=lag, rho=0.5 * gains, most=most, coast=coast, steady=self.steady,
             J=team.inertias, K_d=gains * team.inertias,

@@ -65,11 +65,10 @@ class Balance(LoadControlPart, Delays):
         yield from self.delay_warnings(mission, "load_control")
 
     def params(self, team: Team) -> Vector:
-        rate = self.rate * self.bandwidths(team).velocity
-        g, L = max(team.gravity, 1e-3), float(team.cable_lengths.mean())
+        rate = min(self.rate * self.bandwidths(team).velocity, sway(team))
         if team.n <= 2:
-            rate = min(rate, self.swing * math.sqrt(g / L))
-        rate = min(rate, sway(team))
+            wp = math.sqrt(max(team.gravity, 1e-3) / float(team.cable_lengths.mean()))
+            rate = min(rate, self.swing * wp)
         return PARAMS.pack(
             team.n, m=team.load_mass, g=team.gravity, rate=rate,
             tangent=math.tan(math.radians(self.max_lean_deg)),

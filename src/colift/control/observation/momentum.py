@@ -97,7 +97,7 @@ def _feel(i, dt, sees, params, memory):  # type: ignore[no-untyped-def]
             strange = memory[o + M.felt + k] - memory[o + M.apart + k] - m * memory[M.common + k]
             tension += memory[o + M.direction + k] * strange
         return tension
-    world = quaternion.into_body(q[i, 0], -q[i, 1], -q[i, 2], -q[i, 3], f[0], f[1], f[2])  # back
+    world = quaternion.into_world(q[i, 0], q[i, 1], q[i, 2], q[i, 3], f[0], f[1], f[2])
     known = rotors.force_of(
         i, memory[o + M.thrust], q, sees.estimated_rates, params[P.delay], params[p + P.drag],
         memory[M.wind : M.wind + 3], v,
@@ -117,13 +117,8 @@ def _feel(i, dt, sees, params, memory):  # type: ignore[no-untyped-def]
 @kernel(SIGNATURE)
 def _measure(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     """Learn how much longer than told each cable is, while it is taut."""
-    dt, x, v, ends = (
-        now.dt,
-        sees.estimated_positions,
-        sees.estimated_velocities,
-        sees.estimated_ends,
-    )
-    n = x.shape[0]
+    x, v, ends = sees.estimated_positions, sees.estimated_velocities, sees.estimated_ends
+    dt, n = now.dt, x.shape[0]
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
         size = speed = 0.0

@@ -6,14 +6,10 @@ import math
 
 from colift.control.supervision._lift_memory import M
 from colift.kernel.jit import inline
-from colift.kernel.math.smooth import rest_to_rest
+from colift.kernel.math.smooth import rest_to_rest, soonest
 
 SERVO = 15.0
 """Bandwidth with which spans follow the rate that is wanted, 1/s."""
-PEAK = 35.0 / 16.0
-"""Peak speed of a smooth way from rest to rest over its mean."""
-PUSH = 84.0 * math.sqrt(5.0) / 25.0
-"""Its peak acceleration over length and time squared."""
 GENTLE = 0.5
 """Most acceleration of the load on such a way, m/s^2."""
 
@@ -25,9 +21,7 @@ def set_off(memory, begin, goal, speed, least):  # type: ignore[no-untyped-def]
     for k in range(3):
         memory[M.begin + k], memory[M.goal + k] = begin[k], goal[k]
         away += (goal[k] - begin[k]) ** 2
-    away = math.sqrt(away)
-    soonest = max(PEAK * away / speed, math.sqrt(PUSH * away / GENTLE))
-    memory[M.way] = max(least, 1e-3, soonest)
+    memory[M.way] = max(least, 1e-3, soonest(math.sqrt(away), speed, GENTLE))
 
 
 @inline

@@ -37,6 +37,12 @@ def into_body(w, x, y, z, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @inline
+def into_world(w, x, y, z, a, b, c):  # type: ignore[no-untyped-def]
+    """``R(q) v``: a vector ``(a, b, c)`` of the body frame in the world's."""
+    return into_body(w, -x, -y, -z, a, b, c)
+
+
+@inline
 def from_thrust_direction(ux, uy, uz):  # type: ignore[no-untyped-def]
     """Zero-yaw attitude whose third axis is the unit vector u (paper section 2.3).
 

@@ -48,6 +48,16 @@ def rest_to_rest(s):  # type: ignore[no-untyped-def]
     return value, first, second, third
 
 
+PEAK_SPEED, PEAK_BEND = 35.0 / 16.0, 84.0 * math.sqrt(5.0) / 25.0
+"""Of :func:`rest_to_rest` over one metre in one second."""
+
+
+@inline
+def soonest(way, speed, acceleration):  # type: ignore[no-untyped-def]
+    """Time for a way by :func:`rest_to_rest` on which neither speed nor acceleration is more than this."""
+    return max(PEAK_SPEED * way / speed, math.sqrt(PEAK_BEND * way / acceleration))
+
+
 @inline
 def sinusoid(amplitude, factor, p0, p1, p2, p3, sine, cosine):  # type: ignore[no-untyped-def]
     """``amplitude * sin(factor * p)`` and three time derivatives along the phase p(t).
