@@ -501,7 +501,7 @@ class Flight:
         for i, length in enumerate(wanted.tolist()):
             before, _, _ = winch.paid_out(leg.bus.winches, i, self.time)
             change = length - leg.team.cable_lengths[i] - before
-            duration = event.winding(change)
+            duration = winch.winding(change, event.rate)
             leg.bus.winches[i] = before, change, self.time, duration
             last = max(last, duration)
         marks = {self._step + math.ceil(k * last / REBINDS / step) for k in range(1, REBINDS + 1)}

@@ -15,6 +15,7 @@ from colift.control.allocation.base import AllocatorPart
 from colift.control.allocation.limits.hover import hovering
 from colift.control.supervision.base import SupervisionPart
 from colift.errors import Problem, UnknownNameError
+from colift.kernel.math import winch
 from colift.kernel.ports import MAX_DISTURBANCES
 from colift.kernel.signals import columns
 from colift.mission.criteria import METRICS
@@ -339,7 +340,7 @@ def _winch_change(
         message = f"comes before the winch of drone {i} has stopped, at {stops[i]:.4g} s"
         yield Problem(f"{path}.at", f"{event.at:g}", message)
         return
-    times = np.array([event.winding(change) for change in wanted - lengths])
+    times = np.array([winch.winding(change, event.rate) for change in wanted - lengths])
     wound.append((wanted, np.where(turns, event.at + times, stops)))
     true = frame.true_team
     left = true.cable_lengths + wanted - frame.team.cable_lengths

@@ -22,7 +22,6 @@ from pydantic import (
 
 from colift.catalogue import LAYERS
 from colift.errors import ColiftError
-from colift.kernel.math.smooth import soonest
 from colift.team import Ground as GroundBelow
 from colift.team import Team, vehicles
 from colift.team.geometry import Array, ring, ring_cone
@@ -399,10 +398,6 @@ EVENT_FIELDS = (
 )
 
 
-MOST_WINDING = 1.0
-"""Most acceleration of a winch's cable, m/s^2."""
-
-
 class Event(Section):
     """A change during the flight: of the truth, unknown to the controllers, or of the allocator."""
 
@@ -431,10 +426,6 @@ class Event(Section):
     def of_winches(self) -> bool:
         """Whether winches pay cable out or take it in."""
         return self.field == "drones.cable_length"
-
-    def winding(self, change: float) -> float:
-        """Time that a winch takes for this change of a cable's length (m), s."""
-        return float(soonest(abs(change), self.rate, MOST_WINDING))
 
 
 class Bound(Section):

@@ -8,10 +8,19 @@ from __future__ import annotations
 
 from colift.kernel.jit import inline
 from colift.kernel.layout import Layout
-from colift.kernel.math.smooth import rest_to_rest
+from colift.kernel.math.smooth import rest_to_rest, soonest
 
 W = Layout(team={"before": 1, "change": 1, "begin": 1, "duration": 1}).at
 """Numbers of a winch: what is paid out ``before`` it begins to turn, by how much it goes on, m; when, and for how long, s."""
+
+MOST = 1.0
+"""Most acceleration of a winch's cable, m/s^2."""
+
+
+@inline
+def winding(change, rate):  # type: ignore[no-untyped-def]
+    """Time that a winch of this rate (m/s) takes for a change of its cable's length (m), s."""
+    return soonest(abs(change), rate, MOST)
 
 
 @inline
