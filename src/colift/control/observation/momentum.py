@@ -267,9 +267,9 @@ class Momentum(ObservationPart, Delays):
     per_drone = ("rotor_drag",)
     from_team: ClassVar[Mapping[str, float | None]] = {"rotor_drag": 0.0}
 
-    total: Annotated[float, Field(gt=0.0, le=5.0)] = 0.85
+    total: Annotated[float, Field(gt=0.0, le=5.0)] = 1.2
     """Bandwidth of the observer of the whole momentum over that of the velocity loop."""
-    own: Annotated[float, Field(gt=0.0, le=5.0)] = 0.85
+    own: Annotated[float, Field(gt=0.0, le=5.0)] = 1.2
     """Bandwidth of that of each drone, likewise. As fast as that of the whole: what one knows before the other is taken for a
     force on the load."""
     rotor_drag: Drag | list[Drag] | None = None
