@@ -551,6 +551,7 @@ class Flight:
         params["plant"] = self.mission.plant.params(self._true_team(drones))
         bus = make_bus(team.n)
         bus.members[:] = drones
+        bus.attachments[:] = 0.0 if team.body is None else team.body.attachments
         parts = {layer: type(part) for layer, part in self._parts.items()}
         wired = circuit(bus, parts, self._keys, params, memory, disturbances)
         self._legs.append(Leg(drones, team, bus, wired, self._step))
