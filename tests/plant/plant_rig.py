@@ -8,6 +8,7 @@ from colift.kernel.ports import PORTS
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, state_size
 from colift.world.plant._chain import BEAD, CABLE
+from colift.world.plant._params import P
 from colift.world.plant.base import Start
 from colift.world.plant.rigid_cables import RigidCables
 
@@ -127,7 +128,7 @@ class Rig:
     def turning(self):
         """Kinetic energy, J, and angular momentum (3,), world, of a rigid load about its centre of mass."""
         rates = self.state[10:13]
-        momentum = self.team.body.inertia @ rates
+        momentum = self.params[P.inertia : P.inverse].reshape(3, 3) @ rates
         return 0.5 * rates @ momentum, rotation(self.state[6:10]) @ momentum
 
     def spin_momentum(self):

@@ -388,6 +388,7 @@ class ChainPart(BodiesPart):
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
         """Straight cables, as long as the tensions that hold the load make them; slack ones lie in a level arc."""
+        team = replace(team, body=self._cables(team)[0].body)
         memory = super().initial(team, start)
         k, first = self.bead_count, state_size(team.n)
         drones = memory[LOAD:first].reshape(team.n, 1, DRONE)
