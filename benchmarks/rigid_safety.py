@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.control.allocation.base import INFO_SIZE, Beside, Status, ask
-from colift.control.allocation.limits.plan import matrix_of
 from colift.control.allocation.safe_wrench import PRICES, SafeWrench, outward
 from colift.kernel.jit import address_of, monotonic_ns
 from colift.team import Body, Team
 from colift.team.load import box_inertia, usual_attachments
+from colift.team.plan import matrix_of
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,9 @@ def product(a: Array, b: Array) -> Array:
 def turn(vector: Array) -> Array:
     """Quaternions (..., 4) of rotation vectors (..., 3)."""
     angle = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1)
+    return np.concatenate(
+        [np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1
+    )
 
 
 def asked(case: str, cycles: int, team: Team, rate: float, seed: int = 1) -> Asked:
@@ -83,7 +85,10 @@ def asked(case: str, cycles: int, team: Team, rate: float, seed: int = 1) -> Ask
     waves = rng.uniform(0.8, 2.2, (3, 3)), rng.uniform(0.0, 2.0 * np.pi, (3, 3))
 
     def wave(amplitudes: list[float], which: int) -> Array:
-        sines = np.sin(t[:, :, None] * waves[0][which][None, :, None] * (1.0, 0.73) + waves[1][which][None, :, None])
+        sines = np.sin(
+            t[:, :, None] * waves[0][which][None, :, None] * (1.0, 0.73)
+            + waves[1][which][None, :, None]
+        )
         return np.asarray(amplitudes) * 0.5 * sines.sum(axis=2)
 
     motion = wave([2.0, 2.0, 1.0], 0)
@@ -136,7 +141,9 @@ def _run(address, asked, dt, params, memory, tensions, directions, info, out):
     reference, nominal = np.zeros((4, 3)), np.full((n, 3, 3), np.nan)
     for k in range(asked.force.shape[0]):
         reference[2] = asked.acceleration[k]
-        beside = Beside(asked.moment[k], asked.attitude[k], asked.rates[k], asked.measured[k], nominal)
+        beside = Beside(
+            asked.moment[k], asked.attitude[k], asked.rates[k], asked.measured[k], nominal
+        )
         force = asked.force[k]
         begin = monotonic_ns()
         state[k, 0] = ask(
@@ -177,7 +184,9 @@ def places(team: Team, attitude: Array) -> Array:
 def missed(team: Team, what: Asked, pulls: Array) -> Array:
     """What of the wrench is missing (cycles, 6): N, N m."""
     ends = places(team, what.measured)
-    return np.concatenate([pulls.sum(axis=1) + what.force, np.cross(ends, pulls).sum(axis=1) + what.moment], axis=1)
+    return np.concatenate(
+        [pulls.sum(axis=1) + what.force, np.cross(ends, pulls).sum(axis=1) + what.moment], axis=1
+    )
 
 
 def loss(team: Team, miss: Array) -> Array:
@@ -185,7 +194,14 @@ def loss(team: Team, miss: Array) -> Array:
     share = MASS * team.gravity / team.n
     arm = float(np.abs(team.levers).max())
     prices = np.array(
-        [PRICES["horizontal"], PRICES["horizontal"], PRICES["vertical"], PRICES["tip"], PRICES["tip"], PRICES["yaw"]]
+        [
+            PRICES["horizontal"],
+            PRICES["horizontal"],
+            PRICES["vertical"],
+            PRICES["tip"],
+            PRICES["tip"],
+            PRICES["yaw"],
+        ]
     )
     return np.abs(miss / share / np.array([1.0, 1.0, 1.0, arm, arm, arm])) @ prices
 
@@ -208,12 +224,17 @@ def violations(part: SafeWrench, team: Team, what: Asked, pulls: Array) -> dict[
     boxed = np.any(outs != 0.0, axis=1)
     surface = np.degrees(np.arcsin(np.clip(-np.sum(out * along, axis=2)[:, boxed], -1.0, 1.0)))
     rods = min(
-        (rod_distance(ends[:, a], drones[:, a], ends[:, b], drones[:, b]).min() for a in range(team.n) for b in range(a)),
+        (
+            rod_distance(ends[:, a], drones[:, a], ends[:, b], drones[:, b]).min()
+            for a in range(team.n)
+            for b in range(a)
+        ),
         default=math.inf,
     )
     found = {
         "tension, N": max(
-            float((part.tension_floors(team) - tensions).max()), float((tensions - part.tension_caps(team)).max())
+            float((part.tension_floors(team) - tensions).max()),
+            float((tensions - part.tension_caps(team)).max()),
         ),
         "cone, deg": float(np.degrees(np.arccos(-along[..., 2].max(initial=-1.0)))) * 0.0
         + float(np.degrees(np.arccos(np.clip(-along[..., 2], -1.0, 1.0))).max())
@@ -272,7 +293,9 @@ def main() -> None:
                 "loss": float(loss(team, miss[lost]).mean()) if lost.any() else 0.0,
                 "limited": 100.0 * float(np.mean(answers.state[:, 0] == Status.ITERATION_LIMIT)),
                 "recovering": 100.0 * float(np.mean(answers.state[:, 0] == Status.RECOVERING)),
-                "us": [round(float(q) * 1e-3, 2) for q in np.quantile(answers.times, [0.5, 0.99, 1.0])],
+                "us": [
+                    round(float(q) * 1e-3, 2) for q in np.quantile(answers.times, [0.5, 0.99, 1.0])
+                ],
                 **{k: round(v, 6) for k, v in violations(part, team, what, answers.pulls).items()},
             }
             rows.append(row)

@@ -22,10 +22,11 @@ from pydantic import (
 
 from colift.catalogue import LAYERS
 from colift.errors import ColiftError
-from colift.team import Ground as GroundBelow
 from colift.team import Body, Team, vehicles
+from colift.team import Ground as GroundBelow
 from colift.team.geometry import Array, ring, ring_cone
 from colift.team.load import box_inertia, flaw_of, usual_attachments
+from colift.team.plan import plan
 
 Positive = Annotated[float, Field(gt=0.0)]
 Inertia = tuple[Positive, Positive, Positive]
@@ -171,7 +172,9 @@ class Load(Section):
         if self.inertia is None:
             return box_inertia(self.mass, size)
         yz, xz, xy = self.products
-        return np.diag(self.inertia) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+        return np.asarray(
+            np.diag(self.inertia) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+        )
 
     def problems(self) -> list[tuple[str, str, str]]:
         """What a point does not have, what a rigid load must have, and inertias that no body has."""
@@ -184,7 +187,9 @@ class Load(Section):
             return [("size", "", "is required of a rigid load: the edges of the box around it, m")]
         if self.inertia is None:
             if sum(edge > 0.0 for edge in self.size) < 2:
-                return [("inertia", "", "is required of a load without width: no uniform box has it")]
+                return [
+                    ("inertia", "", "is required of a load without width: no uniform box has it")
+                ]
             if any(self.products):
                 return [("products", str(list(self.products)), "needs load.inertia beside it")]
             return []
@@ -626,6 +631,12 @@ class Frame(Section):
     def start_directions(self) -> Array:
         """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""
         drones = self.first_drones()
+        if self.start.directions is None and self.load.kind == "rigid":
+            team = self.team.of(drones)
+            apart = np.nan_to_num(2.0 * ROOM * team.radii)
+            lean = self.start.cone_deg
+            more = {} if lean is None else {"lean": math.radians(lean)}
+            return plan(team, distance=apart, **more)[0]
         if self.start.directions is None:
             heading = math.radians(self.start.heading_deg)
             return ring(len(drones), self.start_cone, heading=heading)
