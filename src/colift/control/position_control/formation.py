@@ -10,28 +10,36 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
-from colift.control.position_control._cable import CABLE, lead, swing
+from colift.control.position_control._cable import (
+    CABLE,
+    FRAME,
+    lead,
+    lead_within,
+    swing,
+    turn_frame,
+)
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import rotors
 from colift.kernel.math.smooth import decay
+from colift.kernel.math.sphere import FOLLOW
 from colift.part import Setup, Vector
 from colift.team import Team
 
 PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "velocity": 1, "stiffness": 1, "band": 1, "frequency": 1,
-        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1,
+        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1, "rigid": 1,
     },
     drone={"m": 1, "L": 1, "least": 1, "most": 1, "drag": 1},
 )  # fmt: skip
 """``band``: bandwidth of the velocity loop, 1/s; thrusts ``least`` and ``most``, N; ``total``: mass of all drones."""
 MEMORY = Layout(
-    team={"planned": 3},
+    team={"planned": 3, "frame": FRAME},
     drone={
-        "started": 1, "direction": CABLE, "aim": AIM_ALONG, "jerk": 3, "snap": 3, "change": 9,
+        "own": FOLLOW, "started": 1, "direction": CABLE, "aim": AIM_ALONG, "jerk": 3, "snap": 3, "change": 9,
     },
 )  # fmt: skip
 """``planned``: thrust vector as far as it is free of noise; ``change``: pull that the load's motion asks for, two derivatives."""
@@ -86,6 +94,11 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     short_y = forces[n, 1] - m_L * reference[2, 1]
     short_z = forces[n, 2] - m_L * (reference[2, 2] + g)
     stands = sees.standing[n] != 0.0
+    if params[P.rigid] > 0.0:
+        fresh = memory[M.rows + M.started] == 0.0
+        turn_frame(
+            fresh, reference, sees.reference_attitude, g, dt, keep_snap, memory, M.frame
+        )  # fmt: skip
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
@@ -101,7 +114,10 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
                 if swinging:
                     memory[d + 9 + k] = T[i] * alpha[i, k] - change[k]
         reach = params[P.max_swing] / (omega * omega * L)
-        if swinging:
+        if params[P.rigid] > 0.0 and math.isnan(nominal[i, 0, 0]):
+            fresh = memory[o + M.started] == 0.0
+            lead_within(i, fresh, alpha, M.frame, omega, dt, memory, o + M.own, d, reach)
+        elif swinging:
             swing(i, alpha, T, change, omega, dt, memory, d, reach)
         else:
             lead(i, alpha, nominal, omega, dt, memory, d, reach)
@@ -188,6 +204,8 @@ class Formation(PositionControlPart, Delays):
     """Gain of the position error over the square of that of the velocity error."""
     frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.55
     """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
+    rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 1.5
+    """The same for cables that hold a rigid load."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
     max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
@@ -213,12 +231,19 @@ class Formation(PositionControlPart, Delays):
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
 
+    def answers(self, team: Team) -> float:
+        """Natural frequency of the filter of cable directions, rad/s."""
+        band = self.bandwidths(team).velocity
+        if team.body is not None:  # attitude is fed back through them
+            return self.rigid_frequency * band
+        return min(self.frequency * band, sway(team))
+
     def params(self, team: Team) -> Vector:
         band = self.bandwidths(team).velocity
         k = self.gain * band
         return PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
-            band=band, frequency=min(self.frequency * band, sway(team)), thrust_filter=self.thrust_filter / band,
+            band=band, frequency=self.answers(team), rigid=float(team.body is not None), thrust_filter=self.thrust_filter / band,
             max_swing=self.max_swing, max_push=self.max_push,
             tangent=math.tan(math.radians(self.max_tilt_deg)), total=float(team.masses.sum()),
             m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,
