@@ -20,11 +20,11 @@ from pydantic import Field
 
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
 from colift.control.tuning import Delays, sway
-from colift.kernel.jit import inline, kernel
+from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
+from colift.kernel.math.small import cross, matrix_times
 from colift.kernel.math.smooth import decay
-from colift.kernel.math.vectors import cross
 from colift.part import Setup, Vector
 from colift.team import Team
 
@@ -37,16 +37,6 @@ PARAMS = Layout(
 MEMORY = Layout(team={"push": 3, "moment": 3})
 """Filtered external force on the load, N; integral part of the moment, in its frame, N m."""
 P, M = PARAMS.at, MEMORY.at
-
-
-@inline
-def _times(o, params, v):  # type: ignore[no-untyped-def]
-    """Product of the inertia with a vector of the load's frame."""
-    return (
-        params[o] * v[0] + params[o + 1] * v[1] + params[o + 2] * v[2],
-        params[o + 3] * v[0] + params[o + 4] * v[1] + params[o + 5] * v[2],
-        params[o + 6] * v[0] + params[o + 7] * v[1] + params[o + 8] * v[2],
-    )
 
 
 @kernel(SIGNATURE)
@@ -72,11 +62,13 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     e_R = (-2.0 * ew * ex, -2.0 * ew * ey, -2.0 * ew * ez)
     e_W = (Omega[0] - wanted[0], Omega[1] - wanted[1], Omega[2] - wanted[2])
     J = P.J
-    gyration = cross(Omega, _times(J, params, Omega))
+    gyration = cross(Omega, matrix_times(J, params, Omega))
     ahead = cross(Omega, wanted)
-    ahead = _times(J, params, (turning[0] - ahead[0], turning[1] - ahead[1], turning[2] - ahead[2]))
-    turn = _times(J, params, e_R)
-    spin = _times(J, params, e_W)
+    ahead = matrix_times(
+        J, params, (turning[0] - ahead[0], turning[1] - ahead[1], turning[2] - ahead[2])
+    )
+    turn = matrix_times(J, params, e_R)
+    spin = matrix_times(J, params, e_W)
     stands = sees.standing[last] != 0.0
     moment = writes.moment
     for k in range(3):

@@ -12,19 +12,16 @@ from pydantic import Field
 from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
 from colift.control.position_control._cable import (
     CABLE,
-    FRAME,
     lead,
-    lead_within,
     swing,
-    turn_frame,
 )
+from colift.control.position_control._nominal import numbers, plan_pulls, room
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import rotors
 from colift.kernel.math.smooth import decay
-from colift.kernel.math.sphere import FOLLOW
 from colift.part import Setup, Vector
 from colift.team import Team
 
@@ -37,9 +34,9 @@ PARAMS = Layout(
 )  # fmt: skip
 """``band``: bandwidth of the velocity loop, 1/s; thrusts ``least`` and ``most``, N; ``total``: mass of all drones."""
 MEMORY = Layout(
-    team={"planned": 3, "frame": FRAME},
+    team={"planned": 3},
     drone={
-        "own": FOLLOW, "started": 1, "direction": CABLE, "aim": AIM_ALONG, "jerk": 3, "snap": 3, "change": 9,
+        "started": 1, "direction": CABLE, "aim": AIM_ALONG, "jerk": 3, "snap": 3, "change": 9,
     },
 )  # fmt: skip
 """``planned``: thrust vector as far as it is free of noise; ``change``: pull that the load's motion asks for, two derivatives."""
@@ -95,10 +92,12 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     short_z = forces[n, 2] - m_L * (reference[2, 2] + g)
     stands = sees.standing[n] != 0.0
     if params[P.rigid] > 0.0:
-        fresh = memory[M.rows + M.started] == 0.0
-        turn_frame(
-            fresh, reference, sees.reference_attitude, g, dt, keep_snap, memory, M.frame
+        own, kept = params[P.rows + P.width * n :], memory[M.rows + M.width * n :]
+        plan_pulls(
+            n, reference, sees.reference_attitude, sees.reference_rates, dt, keep_snap, own, kept
         )  # fmt: skip
+        if math.isnan(nominal[0, 0, 0]):
+            nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
@@ -114,10 +113,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
                 if swinging:
                     memory[d + 9 + k] = T[i] * alpha[i, k] - change[k]
         reach = params[P.max_swing] / (omega * omega * L)
-        if params[P.rigid] > 0.0 and math.isnan(nominal[i, 0, 0]):
-            fresh = memory[o + M.started] == 0.0
-            lead_within(i, fresh, alpha, M.frame, omega, dt, memory, o + M.own, d, reach)
-        elif swinging:
+        if swinging:
             swing(i, alpha, T, change, omega, dt, memory, d, reach)
         else:
             lead(i, alpha, nominal, omega, dt, memory, d, reach)
@@ -241,7 +237,7 @@ class Formation(PositionControlPart, Delays):
     def params(self, team: Team) -> Vector:
         band = self.bandwidths(team).velocity
         k = self.gain * band
-        return PARAMS.pack(
+        own = PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
             band=band, frequency=self.answers(team), rigid=float(team.body is not None), thrust_filter=self.thrust_filter / band,
             max_swing=self.max_swing, max_push=self.max_push,
@@ -249,3 +245,7 @@ class Formation(PositionControlPart, Delays):
             m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,
             most=self.settled("max_thrust", team), drag=self.settled("rotor_drag", team),
         )  # fmt: skip
+        return np.concatenate([own, numbers(team)])
+
+    def memory(self, team: Team) -> Vector:
+        return np.concatenate([super().memory(team), np.zeros(room(team))])

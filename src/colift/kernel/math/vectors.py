@@ -72,9 +72,3 @@ def eliminate(vector, count, first, second, one, two, a, b, c, d):  # type: igno
     """:func:`eliminate_quad` for ``count`` numbers of each column, which is rounded up to whole quads."""
     for k in range(0, count, QUAD):
         eliminate_quad(vector, first + k, second + k, one + k, two + k, a, b, c, d)
-
-
-@inline
-def cross(a, b):  # type: ignore[no-untyped-def]
-    """Vector product of two triples."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
