@@ -331,7 +331,7 @@ class Safe(AllocatorPart):
         return self
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        return self.wrong_lengths(team.n) or self._crossed(team)
+        return super().check(team) or self._crossed(team)
 
     def asked_angles(self, team: Team) -> tuple[Array, Array]:
         """As :meth:`pair_angles`, with ellipsoids as the spheres within them: what no formation can do without."""

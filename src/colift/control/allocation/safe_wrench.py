@@ -739,6 +739,7 @@ class SafeWrench(AllocatorPart):
 
     kernel = _allocate
     remembers = MEMORY
+    wrenches = True
     spread_setting = ("cone_deg", (10.0, 20.0, 30.0, 40.0, 50.0))
     per_drone = ("tension_min", "tension_max", "max_thrust", "min_distance", "cable_distance")
     of_all = ("tension_min", "tension_max", "max_rate")
@@ -805,7 +806,7 @@ class SafeWrench(AllocatorPart):
         }
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        if problems := self.wrong_lengths(team.n):
+        if problems := super().check(team):
             return problems
         low, high = self.settled("tension_min", team), self.settled("tension_max", team)
         if np.all(1.2 * low <= high):

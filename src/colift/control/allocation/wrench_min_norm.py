@@ -92,6 +92,7 @@ class WrenchMinNorm(AllocatorPart):
 
     kernel = _allocate
     remembers = MEMORY
+    wrenches = True
 
     cone_deg: Annotated[float, Field(gt=0.0, lt=80.0)] = 30.0
     """Angle of the formation's cables from the vertical in hover, degrees."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from colift.kernel.ports import PORTS
 from colift.part import Part
+from colift.team import Team
 
 SIGNATURE = PORTS["load_control"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
@@ -20,3 +21,10 @@ class LoadControlPart(Part):
     layer: ClassVar[str] = "load_control"
     senses: ClassVar[tuple[str, ...]] = ("load",)
     """The sensors (:data:`colift.world.sensing.base.SENSORS`) whose delay it suffers."""
+    turns: ClassVar[bool] = False
+    """Whether it wants a moment, as a rigid load needs, too."""
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        if team.body is not None and not self.turns:
+            return [("kind", "wants no moment: a rigid load needs pose")]
+        return super().check(team)
