@@ -74,6 +74,8 @@ M, COLUMNS = MEMORY.at, MEMORY.spans
 R, V = elastic.R, elastic.V
 WIDTH, PAIR = elastic.WIDTH, elastic.PAIR
 
+TURNING = 3.0
+"""Fastest turn of a cable of 1 m that holds a rigid load, rad/s."""
 PRICES = {"horizontal": 60.0, "vertical": 1000.0, "tip": 200.0, "yaw": 20.0}
 """Of what is missing of a wrench, in shares of the load: yaw gives way first, then horizontal force, roll and pitch, the weight last."""
 ROOM = 1e-3
@@ -775,8 +777,8 @@ class SafeWrench(AllocatorPart):
     max_cone_deg: Degrees = 75.0
     """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
     max_rate: Annotated[float, Field(gt=0.0, le=1e3)] | None = None
-    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 0.4 for a cable of 1 m and less as
-    the square root of its length, 1 for teams of one or two; else 6."""
+    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 3 for a cable of 1 m and less as the
+    square root of its length, as a rigid load is moved by cables that turn; 0.4 on a point, 1 for teams of one or two; else 6."""
     max_thrust: Force | list[Force] | None = None
     """Largest thrust of a drone, N. None: 0.95 of ``drones.max_thrust``, or not limited."""
     max_tilt_deg: Degrees | None = None
@@ -795,7 +797,11 @@ class SafeWrench(AllocatorPart):
         known = np.isfinite(team.max_thrusts)
         share = _share(team)
         lifts = MOST * team.max_thrusts - team.masses * team.gravity
-        turn = RATE / math.sqrt(float(team.cable_lengths.mean())) if team.n > 2 else SWINGING
+        turn = (TURNING if team.body is not None else RATE) / math.sqrt(
+            float(team.cable_lengths.mean())
+        )
+        if team.n <= 2:
+            turn = SWINGING
         return {
             "max_rate": np.where(known.all(), np.full(team.n, turn), math.nan),
             "tension_min": np.where(known, LOW * share, math.nan),

@@ -121,7 +121,7 @@ class Pose(LoadControlPart, Delays):
 
     place: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     """Natural frequency of the feedback of the place, rad/s; critically damped."""
-    turn: Annotated[float, Field(ge=0.0, le=50.0)] = 2.0
+    turn: Annotated[float, Field(ge=0.0, le=50.0)] = 3.0
     """Natural frequency of the feedback of the attitude, rad/s."""
     damping: Annotated[float, Field(ge=0.0, le=5.0)] = 1.0
     """Its damping ratio."""

@@ -200,7 +200,7 @@ class Formation(PositionControlPart, Delays):
     """Gain of the position error over the square of that of the velocity error."""
     frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.55
     """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
-    rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.4
+    rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.12
     """The same for cables that hold a rigid load."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
