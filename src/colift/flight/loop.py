@@ -26,7 +26,7 @@ from colift.control.allocation.base import INFO_SIZE, Status
 from colift.errors import ColiftError
 from colift.flight import agents
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
-from colift.kernel.load import ends_of
+from colift.kernel.load import add_arms, add_wanted_arms, ends_of, is_rigid
 from colift.kernel.math.winch import paid_out
 from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named, type_of
 from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
@@ -48,7 +48,8 @@ Common = named_tuple(
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
         "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "reference",
-        "nominal_forces", "estimated_load", "estimated_ends", "wanted_ends", "reference_shift",
+        "reference_attitude", "reference_rates", "nominal_forces", "attachments",
+        "estimated_load", "estimated_load_attitude", "estimated_load_rates", "estimated_ends", "wanted_ends", "reference_shift",
         "lift_share", "unhooked", "attached", "winches", "reeled",
         *(name for name in agents.SIGNALS if name != "carrying"),
     ],
@@ -99,13 +100,18 @@ _decide = agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
-def _follow_clock(course, rate, shift, reference, nominal):  # type: ignore[no-untyped-def]
+def _follow_clock(course, rate, shift, bus):  # type: ignore[no-untyped-def]
     """From derivatives along the reference's clock, which runs at this rate, to those in time; and shifted."""
+    reference, nominal = bus.reference, bus.nominal_forces
+    for j in range(4):
+        bus.reference_attitude[j] = course.reference_attitude[j]
     power = 1.0
     for m in range(4):
         for j in range(3):
             reference[m, j] = power * course.reference[m, j] + shift[m, j]
         if m < 3:
+            for j in range(3):
+                bus.reference_rates[m, j] = power * rate * course.reference_rates[m, j]
             for i in range(nominal.shape[0]):
                 for j in range(3):
                     nominal[i, m, j] = power * course.nominal_forces[i, m, j]
@@ -122,6 +128,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
     """
     dt = every.step
     n = bus.tensions.shape[0]
+    rigid = is_rigid(bus.attachments)
     first_row = (first + every.recording - 1) // every.recording
     first_cycle = (first + every.allocation - 1) // every.allocation
     for k in range(first, last):
@@ -133,13 +140,20 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
         _sense(wires.sensing, k, t, dt)
         _estimate(wires.estimation, k, t, dt)
         ends_of(bus.estimated_load, bus.estimated_ends)
+        if rigid:
+            turn = bus.estimated_load_rates
+            add_arms(
+                bus.attachments, bus.estimated_load_attitude, turn[0], turn[1], turn[2],
+                bus.estimated_ends,
+            )  # fmt: skip
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
-        _follow_clock(
-            wires.reference.writes, bus.clock[1], bus.reference_shift, bus.reference,
-            bus.nominal_forces,
-        )  # fmt: skip
+        _follow_clock(wires.reference.writes, bus.clock[1], bus.reference_shift, bus)
         ends_of(bus.reference, bus.wanted_ends)
+        if rigid:
+            add_wanted_arms(
+                bus.attachments, bus.reference_attitude, bus.reference_rates, bus.wanted_ends
+            )
 
         if k % every.load_control == 0:
             _control_load(wires.load_control, k, t, every.load_control * dt)

@@ -133,6 +133,13 @@ def inline(function: F) -> F:
     return cast(F, compiled)
 
 
+def aside(function: F) -> F:
+    """A helper that stays a function of its own in the kernels that call it: for what is rarely needed, or needed in many places."""
+    njit: Any = numba.njit
+    compiled: Any = njit(fastmath=_FASTMATH, error_model="numpy", no_cfunc_wrapper=True)(function)
+    return cast(F, compiled)
+
+
 def splice(function: F) -> F:
     """A helper that hands out a part of an array, also to kernels in which nobody counts: its lines become theirs."""
     compiled: Any = numba.njit(error_model="numpy", fastmath=_FASTMATH, inline="always")(function)

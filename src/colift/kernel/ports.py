@@ -216,16 +216,21 @@ def _named(prefix: str) -> tuple[str, ...]:
     return tuple(f"{prefix}_{name}" for name in _TRUE.split())
 
 
+def _turned(prefix: str) -> tuple[str, ...]:
+    return tuple(f"{prefix}load_{name}" for name in ("attitude", "rates"))
+
+
+_WANTED = ("reference", "reference_attitude", "reference_rates")
 _FELT = ("measured_specific_forces", "specific_force_ages")
 _RECEIVED = ("received_tensions", "received_directions", "received_ages")
 
 PORTS: dict[str, Port] = {
     port.name: port
     for port in (
-        Port("sensing", sees=(*_TRUE.split(), "stuck")),
+        Port("sensing", sees=(*_TRUE.split(), *_turned(""), "stuck")),
         Port(
             "estimation",
-            sees=(*_named("measured"), "measured_ages", *_FELT, "thrusts", "reeled", "found_lengths", *_RECEIVED),
+            sees=(*_named("measured"), *_turned("measured_"), "measured_ages", *_FELT, "thrusts", "reeled", "found_lengths", *_RECEIVED),
         ),
         Port(
             "supervision",
@@ -235,8 +240,15 @@ PORTS: dict[str, Port] = {
             ),
         ),
         Port("reference", sees=()),
-        Port("load_control", sees=("estimated_load", "reference", "estimated_forces", "standing")),
-        Port("allocation", sees=("force", "reference", "nominal_forces"), answers=True),
+        Port(
+            "load_control",
+            sees=("estimated_load", *_turned("estimated_"), *_WANTED, "estimated_forces", "standing"),
+        ),
+        Port(
+            "allocation",
+            sees=("force", "moment", *_WANTED, "estimated_load_attitude", "nominal_forces"),
+            answers=True,
+        ),
         Port("link", sees=("desired_tensions", "desired_directions")),
         Port("network", sees=("outboxes",)),
         Port(

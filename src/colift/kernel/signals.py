@@ -33,8 +33,8 @@ class Signal:
     symbol: str
     frame: str
     meaning: str
-    initial: float = 0.0
-    """Value until the first writer."""
+    initial: float | tuple[float, ...] = 0.0
+    """Value until the first writer; of each column, where there are several."""
     each: str = "row"
     """Recorded in each ``"row"`` of the log, or for each ``"allocation"``."""
     writer: str = ""
@@ -47,6 +47,9 @@ class Signal:
         sizes = {"n": n, "n+1": n + 1}
         return tuple(sizes[size] if isinstance(size, str) else size for size in self.shape)
 
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+"""The attitude of what stands level, wxyz."""
 
 SIGNALS = (
     Signal("reference", (4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives", writer="reference"),
@@ -109,6 +112,15 @@ SIGNALS = (
     Signal("measured_specific_forces", ("n", 3), "m/s^2", "-", "body", "acceleration of each drone less gravity's, as its accelerometer measures it", writer="sensing"),
     Signal("specific_force_ages", ("n",), "s", "-", "-", "time since those samples were taken", writer="sensing"),
     Signal("reeled", ("n", 3), "m, m/s, m/s^2", "-", "-", "cable that each winch has paid out since the start, with two derivatives"),
+    Signal("load_attitude", (4,), "1", "q_L", "load to world", "attitude of a rigid load, wxyz", initial=LEVEL, writer="plant_observe"),
+    Signal("load_rates", (3,), "rad/s", "Omega_L", "load", "its rates", writer="plant_observe"),
+    Signal("reference_attitude", (4,), "1", "q_Ld", "load to world", "wanted attitude of the load, wxyz", initial=LEVEL, writer="reference"),
+    Signal("reference_rates", (3, 3), "rad/s, rad/s^2, rad/s^3", "Omega_Ld", "wanted load", "wanted rates of the load and two derivatives", writer="reference"),
+    Signal("moment", (3,), "N m", "M_L", "world", "wanted moment of the cables about the load's centre of mass", writer="load_control"),
+    Signal("measured_load_attitude", (4,), "1", "-", "load to world", "attitude of the load as measured, wxyz", initial=LEVEL, writer="sensing"),
+    Signal("measured_load_rates", (3,), "rad/s", "-", "load", "its rates as measured", writer="sensing"),
+    Signal("estimated_load_attitude", (4,), "1", "-", "load to world", "attitude of the load that the controllers use, wxyz", initial=LEVEL, writer="estimation"),
+    Signal("estimated_load_rates", (3,), "rad/s", "-", "load", "its rates that the controllers use", writer="estimation"),
     Signal("found_lengths", ("n",), "m", "-", "-", "by how much each cable is found to be longer than is told", writer="observation"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
@@ -153,6 +165,16 @@ ENDS = (
 )  # fmt: skip
 """Not recorded, as they follow from the load (:mod:`colift.kernel.load`); the loop writes those without a writer."""
 
+ATTACHMENTS = Signal(
+    "attachments",
+    ("n", 3),
+    "m",
+    "rho_i",
+    "load",
+    "places of the cables' ends on a rigid load, as the controllers are told; zeros on a point",
+)
+"""Not recorded: the mission says it."""
+
 MESSAGE = 30
 """Length of what a drone broadcasts, bytes: what one packet of a Crazyflie's radio holds."""
 
@@ -175,7 +197,7 @@ WINCHES = Signal(
 )
 """Not recorded: the flight's events write it, and ``reeled`` is what comes of it."""
 
-HIDDEN = (ANSWER, NOMINAL, WINCHES, *LEAD, *ENDS, *MESSAGES)
+HIDDEN = (ANSWER, NOMINAL, WINCHES, ATTACHMENTS, *LEAD, *ENDS, *MESSAGES)
 """Signals of the bus that stand outside of its row."""
 
 OF_ONE = (

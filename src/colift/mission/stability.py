@@ -40,7 +40,8 @@ class Judged(NamedTuple):
 
 
 def loops_of(mission: Mission) -> list[Judged]:
-    """The margins of attitude, position and load, from the inside out; what has no linear law of its own is left out.
+    """The margins of attitude, position and load, from the inside out; what has no linear law of its own, or carries a load with an
+    extent, is left out.
 
     An unstable loop is the last one: those around it have no margin.
     """
@@ -67,9 +68,11 @@ def loops_of(mission: Mission) -> list[Judged]:
             turned(i, axis)
     attitude = min((margin for margin, _, _ in cases.values()), key=lambda m: m.modulus)
     judged = [Judged("attitude", "attitude_control", attitude)]
-    if not attitude.stable or told.gravity == 0.0:
-        return judged
     position, load = mission.position_control.of(drones), mission.load_control.of(drones)
+    laws = [(position.places(told, axis), load.hanging(told, axis)) for axis in (0, 1)]
+    known = true.body is None and told.gravity > 0.0 and not any(None in pair for pair in laws)
+    if not (attitude.stable and known):
+        return judged
     observation, filters = mission.observation.of(drones), mission.estimation.filters()
     bodies = _bodies(mission, drones)
     kalman = filters or (None, None)
@@ -77,10 +80,9 @@ def loops_of(mission: Mission) -> list[Judged]:
     places: list[Margin] = []
     loads: list[Margin] = []
     asked = set()
-    for axis in (0, 1):
-        feedback, hanging = position.places(told, axis), load.hanging(told, axis)
-        if feedback is None or hanging is None:
-            return judged
+    for axis, (feedback, hanging) in enumerate(laws):
+        assert feedback is not None
+        assert hanging is not None
         middle = int(np.argsort(ratios[:, 1 - axis])[told.n // 2])
         _, tilt, spin = turned(middle, 1 - axis)
         key = (feedback, hanging, ratios[middle, 1 - axis])

@@ -94,7 +94,7 @@ def _tick(  # type: ignore[no-untyped-def]
     allocate, forces, dt, period, params, memory, tensions, directions, info, rest, out
 ):
     """One call per tick, ``period`` ns apart; a row of ``out``: late, 0, own, away (ns), iterations."""
-    nominal = unplanned(tensions.shape[0])
+    beside = unplanned(tensions.shape[0])
     tick = monotonic_ns()
     for k in range(forces.shape[0]):
         tick += period
@@ -104,7 +104,7 @@ def _tick(  # type: ignore[no-untyped-def]
         while monotonic_ns() < tick:
             pass
         begin, cpu = monotonic_ns(), thread_time_ns()
-        ask(allocate, forces[k], rest, nominal, dt, params, memory, tensions, directions, info)
+        ask(allocate, forces[k], rest, beside, dt, params, memory, tensions, directions, info)
         own = thread_time_ns() - cpu
         wall = monotonic_ns() - begin
         out[k, 0] = begin - tick

@@ -65,13 +65,13 @@ def _attack(  # type: ignore[no-untyped-def]
 ):
     """Call an allocator once per force; a row of ``out``: status, ns, tensions (n), directions (3n)."""
     n = tensions.shape[0]
-    nominal = unplanned(n)
+    beside = unplanned(n)
     for k in range(forces.shape[0]):
         for m in range(3):
             reference[2, m] = accelerations[k, m]
         begin = monotonic_ns()
         out[k, 0] = ask(
-            allocate, forces[k], reference, nominal, dt, params, memory, tensions, directions, info
+            allocate, forces[k], reference, beside, dt, params, memory, tensions, directions, info
         )
         out[k, 1] = monotonic_ns() - begin
         for i in range(n):

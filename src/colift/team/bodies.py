@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from colift.errors import SettingError
 from colift.team.ground import Ground
+from colift.team.load import Body
 from colift.team.vehicles import Vehicle, complete, impossible, vehicle_of
 from colift.wording import numbers, shown
 
@@ -78,6 +79,8 @@ class Team:
         Ideal power of the rotors in hover over the battery's power.
     ground : Ground or None
         What is below them; None for nothing.
+    body : Body or None
+        The load as a rigid body with n attachments; None for a point.
 
     Raises
     ------
@@ -102,6 +105,7 @@ class Team:
     energies: NDArray[np.float64] = None  # type: ignore[assignment]
     efficiencies: NDArray[np.float64] = None  # type: ignore[assignment]
     ground: Ground | None = None
+    body: Body | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.masses)
@@ -117,6 +121,9 @@ class Team:
         load_mass = numbers("load_mass", self.load_mass, (), above=0.0)
         object.__setattr__(self, "load_mass", float(load_mass))
         object.__setattr__(self, "gravity", float(numbers("gravity", self.gravity, (), least=0.0)))
+        if self.body is not None and self.body.n != n:
+            message = f"must be one for each of {n} drones"
+            raise SettingError.of("attachments", f"{self.body.n} points", message)
 
     @property
     def n(self) -> int:
@@ -130,8 +137,14 @@ class Team:
             raise SettingError.of("drones", shown(chosen), f"must be some of 0 to {self.n - 1}")
         return replace(
             self,
+            body=None if self.body is None else self.body.of(chosen),
             **{name: getattr(self, name)[chosen] for name in (*PLACES.values(), "cable_lengths")},
         )
+
+    @property
+    def levers(self) -> NDArray[np.float64]:
+        """Where the cables end (n, 3), from the load's centre of mass, in its frame, m; zeros for a point."""
+        return np.zeros((self.n, 3)) if self.body is None else self.body.arms
 
     def with_ropes(self, density: float) -> Team:
         """The team with the mass of cables of this density (kg/m), half of each to its drone and half to the load.
@@ -140,9 +153,9 @@ class Team:
         is a pull along the chord between them and half of its weight.
         """
         half = 0.5 * density * self.cable_lengths
-        return replace(
-            self, masses=self.masses + half, load_mass=self.load_mass + float(half.sum())
-        )
+        body = None if self.body is None else self.body.with_masses(self.load_mass, half)
+        load_mass = self.load_mass + float(half.sum())
+        return replace(self, masses=self.masses + half, load_mass=load_mass, body=body)
 
     @property
     def disc_areas(self) -> NDArray[np.float64]:
@@ -229,6 +242,7 @@ class Team:
         cable_lengths: NDArray[np.float64],
         gravity: float = 9.81,
         ground: Ground | None = None,
+        body: Body | None = None,
     ) -> Team:
         """The team of drones with these numbers, by field of :class:`colift.team.vehicles.Vehicle`."""
         arrays: dict[str, Any] = {
@@ -240,6 +254,7 @@ class Team:
             cable_lengths=cable_lengths,
             gravity=gravity,
             ground=ground,
+            body=body,
             **arrays,
         )
 

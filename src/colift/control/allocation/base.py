@@ -1,6 +1,7 @@
 """The contract of the allocation layer, and the object that calls any allocator by hand.
 
-An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i = -F``.
+An allocator shares the wanted load force among the cables: ``sum_i T_i alpha_i = -F``; of a rigid load also the wanted
+moment about its centre of mass, ``sum_i r_i x T_i alpha_i = -M`` with ``r_i`` from there to the cable's end.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from colift.errors import Problem, SettingError
 from colift.kernel.jit import address_of, f8, i8, inline, kernel, matrix, tensor, vector
 from colift.kernel.ports import PORTS, Wire
+from colift.kernel.signals import LEVEL
 from colift.kernel.status import Status as Status
 from colift.part import Part, Setup, Vector
 from colift.team import Team
@@ -34,23 +36,50 @@ _Sees, _Writes = PORTS["allocation"].Sees, PORTS["allocation"].Writes
 _invoke = PORTS["allocation"].invoke
 
 
+class Beside(NamedTuple):
+    """What an allocator sees beside force and reference, as the signals of these names; for a point load :func:`unplanned`."""
+
+    moment: Any
+    reference_attitude: Any
+    reference_rates: Any
+    estimated_load_attitude: Any
+    nominal_forces: Any
+
+
 @inline
-def ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+def ask(address, force, reference, beside, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
     """Call an allocator's kernel, from compiled code of studies and benchmarks, by its address."""
-    sees, writes = _Sees(force, reference, nominal), _Writes(tensions, directions, info)
+    sees = _Sees(
+        force, beside.moment, reference, beside.reference_attitude, beside.reference_rates,
+        beside.estimated_load_attitude, beside.nominal_forces,
+    )  # fmt: skip
+    writes = _Writes(tensions, directions, info)
     return _invoke(Wire(address, 0, params, memory, sees, writes), 0, 0.0, dt)
 
 
 @inline
 def unplanned(n):  # type: ignore[no-untyped-def]
-    """No nominal forces (n, 3, 3): nothing is planned."""
-    return np.full((n, 3, 3), np.nan)
+    """Beside force and reference: a load that stands level, no moment, and no plan for n cables."""
+    level = np.array((1.0, 0.0, 0.0, 0.0))
+    return Beside(
+        np.zeros(3), level, np.zeros((3, 3)), level.copy(), np.full((n, 3, 3), np.nan)
+    )  # fmt: skip
 
 
-@kernel(i8(i8, vector, matrix, tensor, f8, vector, vector, vector, matrix, vector), counted=False)
-def _ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info):  # type: ignore[no-untyped-def]
+@kernel(
+    i8(
+        i8, vector, matrix, vector, vector, matrix, vector, tensor, f8, vector, vector, vector,
+        matrix, vector,
+    ),
+    counted=False,
+)  # fmt: skip
+def _ask(  # type: ignore[no-untyped-def]
+    address, force, reference, moment, attitude, rates, load_attitude, nominal, dt, params, memory,
+    tensions, directions, info,
+):  # fmt: skip
     """:func:`ask` from Python, to which plain arrays are quicker than named tuples of them."""
-    return ask(address, force, reference, nominal, dt, params, memory, tensions, directions, info)
+    beside = Beside(moment, attitude, rates, load_attitude, nominal)
+    return ask(address, force, reference, beside, dt, params, memory, tensions, directions, info)
 
 
 INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
@@ -267,9 +296,10 @@ class Allocator:
             raise SettingError([Problem(name, "", message) for name, message in problems])
         kernel = type(part).kernel  # through the class: no binding as a method
         self._function = address_of(kernel)
-        self._ask = _ask if self._function is not kernel else getattr(ask, "py_func", ask)
-        self._force = np.zeros(3)
-        self._reference = np.zeros((4, 3))
+        self._ask = _ask if self._function is not kernel else getattr(_ask, "py_func", _ask)
+        self._force, self._moment = np.zeros(3), np.zeros(3)
+        self._reference, self._rates = np.zeros((4, 3)), np.zeros((3, 3))
+        self._wanted, self._attitude = np.array(LEVEL), np.array(LEVEL)
         self._info = np.zeros(INFO_SIZE)
         self._bind(range(self._whole.n))
         self.reset()
@@ -410,8 +440,12 @@ class Allocator:
         force: ArrayLike,
         acceleration: ArrayLike | None = None,
         dt: float | None = None,
+        *,
+        moment: ArrayLike | None = None,
+        attitude: ArrayLike | None = None,
+        wanted_attitude: ArrayLike | None = None,
     ) -> Allocation:
-        """Share ``force`` among the cables.
+        """Share ``force``, and for a rigid load ``moment``, among the cables.
 
         Parameters
         ----------
@@ -423,6 +457,10 @@ class Allocator:
         dt : float, optional
             Time since the last call, s, for allocators that limit rates; the allocator's own ``dt`` when
             left out. What is not positive, or no number, counts as no time at all: nothing turns.
+        moment : (3,) array, optional
+            That the cables must exert about a rigid load's centre of mass, world frame, N m; none when left out.
+        attitude, wanted_attitude : (4,) array, optional
+            Of a rigid load as it is and as it should be, unit quaternions wxyz, load to world; the last given, level at first.
 
         Returns
         -------
@@ -432,24 +470,34 @@ class Allocator:
         Raises
         ------
         SettingError
-            Only when ``force`` or ``acceleration`` is not three numbers, or ``dt`` not one.
+            Only when ``force``, ``acceleration`` or ``moment`` is not three numbers, an attitude not four, or ``dt`` not one.
 
         """
         try:
             wanted = np.asarray(force, dtype=float)
             motion = _REST if acceleration is None else np.asarray(acceleration, dtype=float)
             period = min(_LONGEST, max(_SHORTEST, self.dt if dt is None else float(dt)))
+            turning = _REST if moment is None else np.asarray(moment, dtype=float)
         except (TypeError, ValueError):
-            wanted = motion = np.empty(0)
-        if wanted.shape != (3,) or motion.shape != (3,):
-            _refuse(force=force, acceleration=acceleration, dt=dt)
+            wanted = motion = turning = np.empty(0)
+        if wanted.shape != (3,) or motion.shape != (3,) or turning.shape != (3,):
+            _refuse(dt, force=force, acceleration=acceleration, moment=moment)
+        if attitude is not None:
+            self._attitude[:] = numbers("attitude", attitude, (4,), finite=False)
+        if wanted_attitude is not None:
+            self._wanted[:] = numbers("wanted_attitude", wanted_attitude, (4,), finite=False)
         self._force[:] = wanted
+        self._moment[:] = turning
         self._reference[2] = motion
         start = perf_counter()
         status = self._ask(
             self._function,
             self._force,
             self._reference,
+            self._moment,
+            self._wanted,
+            self._rates,
+            self._attitude,
             self._nominal,
             period,
             self._params,
@@ -468,11 +516,11 @@ class Allocator:
         )
 
 
-def _refuse(force: ArrayLike, acceleration: ArrayLike | None, dt: float | None) -> None:
+def _refuse(dt: float | None, **vectors: ArrayLike | None) -> None:
     """Say what of it is not the numbers that :meth:`Allocator.allocate` takes."""
-    numbers("force", force, (3,), finite=False)
-    if acceleration is not None:
-        numbers("acceleration", acceleration, (3,), finite=False)
+    for name, value in vectors.items():
+        if value is not None:
+            numbers(name, value, (3,), finite=False)
     if dt is not None:
         numbers("dt", dt, (), finite=False)
 

@@ -25,7 +25,16 @@ from colift.control.allocation.base import (
 from colift.control.allocation.common.oracle import paper_objective
 from colift.control.allocation.limits import cycle, distance, newton, recovery
 from colift.control.allocation.limits import feasibility as feasible
-from colift.control.allocation.limits.hover import RESERVE
+from colift.control.allocation.limits.usual import (
+    CLEAR,
+    LOW,
+    MOST,
+    RATE,
+    SWINGING,
+    Degrees,
+    Distance,
+    Force,
+)
 from colift.control.allocation.paper import newton as paper
 from colift.errors import Problem, SettingError
 from colift.kernel.jit import kernel
@@ -219,26 +228,14 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     return _ITERATION_LIMIT
 
 
-Degrees = Annotated[float, Field(gt=0.0, lt=90.0)]
-Force = Annotated[float, Field(gt=0.0, le=1e6)]
-Distance = Annotated[float, Field(ge=0.0, le=1e3)]
-
 RATE_BARRIER = 1.0
 """Barrier of the rate limit, relative to the proximal term at the limit: it holds as strongly as that."""
 GIVE_WAY = 20.0
 """Price of horizontal force, in shares of the load per cable of the largest weight, at which the force gives way."""
-LOW = 0.5
-"""Least tension over a cable's share of the load's weight, where the drones' thrust is known and no limit is given."""
-MOST = 1.0 - RESERVE
-"""Share of a drone's thrust that is planned with then."""
 MU = 8.0
 """Weight of the alignment penalty over W^2 / n^3, for a load of weight W on n cables: a cone in which they stand wide apart."""
-RATE, SWINGING = 0.4, 1.0
-"""Fastest turn of cables of 1 m, rad/s, which drones with real motors can follow; of one or two cables, on which a load swings."""
 ANY = 1e6
 """Force that nothing limits, N."""
-CLEAR = 1.2
-"""Distance that a drone keeps from all others' middle and cables where no limit is given, in its radii."""
 RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
 

@@ -25,6 +25,10 @@ def _believe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             estimated_rates[i, m] = rates[i, m]
         for m in range(4):
             estimated_attitudes[i, m] = attitudes[i, m]
+    for m in range(4):
+        writes.estimated_load_attitude[m] = sees.measured_load_attitude[m]
+    for m in range(3):
+        writes.estimated_load_rates[m] = sees.measured_load_rates[m]
     for i in range(measured_ages.shape[0]):
         for m in range(3):
             estimated_ages[i, m] = measured_ages[i, m]

@@ -58,12 +58,12 @@ def _counted(  # type: ignore[no-untyped-def]
     allocate, forces, dt, params, memory, tensions, directions, info, rest
 ):
     """Call an allocator once per force; the calls after ``WARM_UP`` make one dump of callgrind."""
-    nominal = unplanned(tensions.shape[0])
+    beside = unplanned(tensions.shape[0])
     for k in range(forces.shape[0]):
         if k == WARM_UP:
             _start()
             _zero()
-        ask(allocate, forces[k], rest, nominal, dt, params, memory, tensions, directions, info)
+        ask(allocate, forces[k], rest, beside, dt, params, memory, tensions, directions, info)
     _dump()
     _stop()
 

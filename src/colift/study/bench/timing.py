@@ -65,12 +65,12 @@ def _time_calls(  # type: ignore[no-untyped-def]
     A row of ``out``: wall time (ns), iterations, status, tensions (n), directions (3n).
     """
     n = tensions.shape[0]
-    nominal = unplanned(n)
+    beside = unplanned(n)
     cpu = thread_time_ns()
     for k in range(forces.shape[0]):
         begin = monotonic_ns()
         status = ask(
-            allocate, forces[k], rest, nominal, dt, params, memory, tensions, directions, info
+            allocate, forces[k], rest, beside, dt, params, memory, tensions, directions, info
         )
         out[k, 0] = monotonic_ns() - begin
         out[k, 1] = info[0]

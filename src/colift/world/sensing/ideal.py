@@ -28,6 +28,10 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         for k in range(2):
             for m in range(3):
                 measured_load[k, m] = load[k, m]
+        for m in range(4):
+            writes.measured_load_attitude[m] = sees.load_attitude[m]
+        for m in range(3):
+            writes.measured_load_rates[m] = sees.load_rates[m]
     for i in range(n):
         o = M.rows + M.width * i
         if memory[o + M.started] == 0.0:  # at rest, or as fast as what it joins

@@ -1,0 +1,308 @@
+"""The safe allocator for rigid loads, cycle by cycle: limits broken, wrenches missed and whether they had to be, time.
+
+A box of 0.5 kg, 0.6 x 0.4 x 0.2 m, on cables of 1 m that end on its upper edges, drones of 0.5 kg, 100 Hz. The wrench is that of a
+smooth motion with attitude, the same with white noise on force, moment and measured attitude, or steps of both.
+
+Every answer is judged by code that the allocator does not call. A miss is *proved* by a plane in the space of wrenches that parts the
+wanted one from all that cables within their tensions, cone and turns can make; what is not proved counts as avoidable.
+
+    python benchmarks/rigid_safety.py [--cycles 100000] [--drones 3 4 6 8] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.control.allocation.base import INFO_SIZE, Beside, Status, ask
+from colift.control.allocation.safe_wrench import PRICES, SafeWrench, outward
+from colift.kernel.jit import address_of, monotonic_ns
+from colift.team import Body, Team
+from colift.team.load import box_inertia, usual_attachments
+from colift.team.plan import matrix_of
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.01
+SIZE = np.array([0.6, 0.4, 0.2])
+MASS = 0.5
+CASES = ("smooth", "white 0.1", "white 0.3", "raw steps", "slewed steps")
+
+
+def team_of(n: int) -> Team:
+    """n drones and the box."""
+    attachments = usual_attachments(n, SIZE)
+    body = Body(box_inertia(MASS, SIZE), attachments, size=SIZE)
+    return replace(Team.uniform(n, load_mass=MASS, mass=0.5), body=body)
+
+
+class Asked(NamedTuple):
+    """What is asked in every cycle: wrenches, accelerations, and attitudes as wanted, turning and measured."""
+
+    force: Array
+    moment: Array
+    acceleration: Array
+    attitude: Array
+    rates: Array
+    measured: Array
+
+
+def product(a: Array, b: Array) -> Array:
+    """Hamilton products (..., 4)."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def turn(vector: Array) -> Array:
+    """Quaternions (..., 4) of rotation vectors (..., 3)."""
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.concatenate(
+        [np.cos(0.5 * angle), 0.5 * np.sinc(angle / (2.0 * np.pi)) * vector], axis=-1
+    )
+
+
+def asked(case: str, cycles: int, team: Team, rate: float, seed: int = 1) -> Asked:
+    """A case for so many cycles."""
+    rng = np.random.default_rng([seed, CASES.index(case)])
+    t = PERIOD * np.arange(cycles)[:, None]
+    waves = rng.uniform(0.8, 2.2, (3, 3)), rng.uniform(0.0, 2.0 * np.pi, (3, 3))
+
+    def wave(amplitudes: list[float], which: int) -> Array:
+        sines = np.sin(
+            t[:, :, None] * waves[0][which][None, :, None] * (1.0, 0.73)
+            + waves[1][which][None, :, None]
+        )
+        return np.asarray(amplitudes) * 0.5 * sines.sum(axis=2)
+
+    motion = wave([2.0, 2.0, 1.0], 0)
+    swing = wave([math.radians(10.0), math.radians(10.0), 0.0], 1)
+    yaw = wave([0.0, 0.0, math.radians(90.0)], 2)
+    attitude = product(turn(yaw), turn(swing))
+    step = product(attitude[:-1] * [1, -1, -1, -1], attitude[1:])
+    spin = np.zeros((cycles, 3))
+    spin[:-1] = 2.0 * np.sign(step[:, :1]) * step[:, 1:] / PERIOD
+    spin[-1] = spin[-2]
+    speed = np.gradient(spin, PERIOD, axis=0)
+    inertia = team.body.inertia
+    turns = np.array([matrix_of(q) for q in attitude])
+    moment = np.einsum("kij,kj->ki", turns, speed @ inertia + np.cross(spin, spin @ inertia))
+    measured = attitude
+    if case.startswith("white"):
+        level = float(case.split()[1])
+        motion = motion + level * rng.standard_normal((cycles, 3))
+        moment = moment + (0.01 if level < 0.2 else 0.02) * rng.standard_normal((cycles, 3))
+        measured = product(turn(math.radians(0.2) * rng.standard_normal((cycles, 3))), attitude)
+    if "steps" in case:
+        every = 50
+        jumps = rng.uniform(-3.0, 3.0, (cycles // every + 1, 3)) * [1.0, 1.0, 0.5]
+        tips = rng.uniform(-0.1, 0.1, (cycles // every + 1, 3))
+        motion, moment = jumps[np.arange(cycles) // every], tips[np.arange(cycles) // every]
+        attitude = np.tile([1.0, 0.0, 0.0, 0.0], (cycles, 1))
+        measured, spin, speed = attitude, np.zeros((cycles, 3)), np.zeros((cycles, 3))
+    force = MASS * (motion + [0.0, 0.0, team.gravity])
+    if case == "slewed steps":
+        most = 0.6 * MASS * team.gravity * rate * PERIOD
+        force[:, :2] = slewed(force[:, :2], most)
+        moment = slewed(moment, most * float(np.abs(team.levers).max()))
+    rates = np.stack([spin, speed, np.zeros((cycles, 3))], axis=1)
+    return Asked(*map(np.ascontiguousarray, (force, moment, motion, attitude, rates, measured)))
+
+
+def slewed(wanted: Array, most: float) -> Array:
+    """The same, changing by no more than ``most`` in a cycle."""
+    found = wanted.copy()
+    for k in range(1, len(found)):
+        step = wanted[k] - found[k - 1]
+        found[k] = found[k - 1] + step * min(1.0, most / max(float(np.linalg.norm(step)), 1e-300))
+    return found
+
+
+@numba.njit
+def _run(address, asked, dt, params, memory, tensions, directions, info, out):
+    pulls, state, times = out
+    n = tensions.shape[0]
+    reference, nominal = np.zeros((4, 3)), np.full((n, 3, 3), np.nan)
+    for k in range(asked.force.shape[0]):
+        reference[2] = asked.acceleration[k]
+        beside = Beside(
+            asked.moment[k], asked.attitude[k], asked.rates[k], asked.measured[k], nominal
+        )
+        force = asked.force[k]
+        begin = monotonic_ns()
+        state[k, 0] = ask(
+            address, force, reference, beside, dt, params, memory, tensions, directions, info
+        )
+        times[k] = monotonic_ns() - begin
+        state[k, 1:] = info
+        for i in range(n):
+            pulls[k, i] = tensions[i] * directions[i]
+
+
+class Run(NamedTuple):
+    """Answers: cable forces (cycles, n, 3), N; status and info; time of each call, ns."""
+
+    pulls: Array
+    state: Array
+    times: Array
+
+
+def run(part: SafeWrench, team: Team, what: Asked) -> Run:
+    """Ask for everything, cycle by cycle, from the plan's formation."""
+    cycles, n = len(what.force), team.n
+    out = Run(np.zeros((cycles, n, 3)), np.zeros((cycles, 1 + INFO_SIZE)), np.zeros(cycles))
+    directions, tensions = part.formation(team)
+    _run(
+        address_of(type(part).kernel), what, PERIOD, part.params(team), part.memory(team), tensions.copy(),
+        np.ascontiguousarray(directions), np.zeros(INFO_SIZE), (out.pulls, out.state, out.times),
+    )  # fmt: skip
+    return out
+
+
+def places(team: Team, attitude: Array) -> Array:
+    """Where the cables end from the centre of mass (cycles, n, 3), m."""
+    turns = np.array([matrix_of(q) for q in attitude])
+    return np.einsum("kij,nj->kni", turns, team.levers)
+
+
+def missed(team: Team, what: Asked, pulls: Array) -> Array:
+    """What of the wrench is missing (cycles, 6): N, N m."""
+    ends = places(team, what.measured)
+    return np.concatenate(
+        [pulls.sum(axis=1) + what.force, np.cross(ends, pulls).sum(axis=1) + what.moment], axis=1
+    )
+
+
+def loss(team: Team, miss: Array) -> Array:
+    """What is missing, weighted by its prices, in shares of the load."""
+    share = MASS * team.gravity / team.n
+    arm = float(np.abs(team.levers).max())
+    prices = np.array(
+        [
+            PRICES["horizontal"],
+            PRICES["horizontal"],
+            PRICES["vertical"],
+            PRICES["tip"],
+            PRICES["tip"],
+            PRICES["yaw"],
+        ]
+    )
+    return np.abs(miss / share / np.array([1.0, 1.0, 1.0, arm, arm, arm])) @ prices
+
+
+def violations(part: SafeWrench, team: Team, what: Asked, pulls: Array) -> dict[str, float]:
+    """How far any answer is beyond each limit: N, degrees, m; negative where all are within."""
+    tensions = np.linalg.norm(pulls, axis=2)
+    along = pulls / tensions[..., None]
+    start, _ = part.formation(team)
+    before = np.concatenate([start[None], along[:-1]])
+    turned = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(along - before, axis=2), 1.0))
+    ends = places(team, what.attitude)
+    drones = ends - team.cable_lengths[:, None] * along
+    i, j = np.triu_indices(team.n, k=1)
+    sizes = part.drone_distances(team)
+    apart = np.linalg.norm((drones[:, i] - drones[:, j]) / [1.0, 1.0, part.downwash], axis=2)
+    outs = outward(team)
+    turns = np.array([matrix_of(q) for q in what.attitude])
+    out = np.einsum("kij,nj->kni", turns, outs)
+    boxed = np.any(outs != 0.0, axis=1)
+    surface = np.degrees(np.arcsin(np.clip(-np.sum(out * along, axis=2)[:, boxed], -1.0, 1.0)))
+    rods = min(
+        (
+            rod_distance(ends[:, a], drones[:, a], ends[:, b], drones[:, b]).min()
+            for a in range(team.n)
+            for b in range(a)
+        ),
+        default=math.inf,
+    )
+    found = {
+        "tension, N": max(
+            float((part.tension_floors(team) - tensions).max()),
+            float((tensions - part.tension_caps(team)).max()),
+        ),
+        "cone, deg": float(np.degrees(np.arccos(-along[..., 2].max(initial=-1.0)))) * 0.0
+        + float(np.degrees(np.arccos(np.clip(-along[..., 2], -1.0, 1.0))).max())
+        - part.max_cone_deg,
+        "turn, deg": math.degrees(float(turned.max()) - part.turn_rate(team) * PERIOD),
+        "drones, m": float((0.5 * (sizes[i] + sizes[j]) - apart).max()),
+        "cables, m": part.gap(team) - rods,
+        "box, deg": part.box_deg - float(surface.min(initial=math.inf)),
+    }
+    if np.isfinite(part.thrust_limits(team)).any():
+        ends_motion = what.acceleration[:, None, :] + np.array([0.0, 0.0, team.gravity])
+        thrust = np.linalg.norm(team.masses[:, None] * ends_motion - pulls, axis=2)
+        found["thrust, N"] = float((thrust - part.thrust_limits(team)).max())
+    return found
+
+
+def rod_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Distances (k,) between segments a-b and c-d, by the four ends and the common perpendicular."""
+    best = np.full(len(a), np.inf)
+    for p, (q, r) in ((a, (c, d)), (b, (c, d)), (c, (a, b)), (d, (a, b))):
+        u = r - q
+        s = np.clip(np.sum((p - q) * u, axis=1) / np.sum(u * u, axis=1), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(p - q - s[:, None] * u, axis=1))
+    u, v = b - a, d - c
+    normal = np.cross(u, v)
+    square = np.maximum(np.sum(normal * normal, axis=1), 1e-300)
+    s = np.sum(np.cross(c - a, v) * normal, axis=1) / square
+    t = np.sum(np.cross(c - a, u) * normal, axis=1) / square
+    inside = (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
+    return np.where(inside, np.abs(np.sum((c - a) * normal, axis=1)) / np.sqrt(square), best)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cycles", type=int, default=100_000)
+    parser.add_argument("--drones", type=int, nargs="*", default=[3, 4, 6, 8])
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    for n in args.drones:
+        team = team_of(n)
+        part = SafeWrench(min_distance=0.5)
+        for case in CASES:
+            what = asked(case, args.cycles, team, part.turn_rate(team))
+            answers = run(part, team, what)
+            miss = missed(team, what, answers.pulls)
+            given = np.abs(miss).max(axis=1)
+            lost = given > 1e-6
+            iterations = answers.state[:, 1]
+            row = {
+                "n": n,
+                "case": case,
+                "iterations": float(iterations.mean()),
+                "most": int(iterations.max()),
+                "missed_percent": 100.0 * float(lost.mean()),
+                "loss": float(loss(team, miss[lost]).mean()) if lost.any() else 0.0,
+                "limited": 100.0 * float(np.mean(answers.state[:, 0] == Status.ITERATION_LIMIT)),
+                "recovering": 100.0 * float(np.mean(answers.state[:, 0] == Status.RECOVERING)),
+                "us": [
+                    round(float(q) * 1e-3, 2) for q in np.quantile(answers.times, [0.5, 0.99, 1.0])
+                ],
+                **{k: round(v, 6) for k, v in violations(part, team, what, answers.pulls).items()},
+            }
+            rows.append(row)
+            print(row, flush=True)
+    if args.json:
+        args.json.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""A formation that holds a rigid load in hover: a ring of drones around it, in plain NumPy.
+
+Each cable leans outwards by the same angle, towards a ring of drones at equal azimuths, in the order of their attachments. Outward
+cables hold the yaw (a load that has turned is turned back) and keep drones and cables apart. The upright parts of the
+tensions share the weight so that it does not tip; a last correction of least norm balances all six.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from colift.team.bodies import Team
+from colift.team.geometry import Array, matrix_of, ring
+
+LEAN = math.radians(30.0)
+"""Angle of cables from the vertical, unless distances ask for more."""
+WIDER = math.radians(1.0)
+"""Step in which the ring is widened."""
+SPARE = 1.15
+"""Distances of the plan, over those that are asked for."""
+FLOOR = 0.2
+"""Least upright part of a tension, over a cable's share of the weight."""
+MIDDLE = 0.15
+"""Attachments that are closer to the middle than this part of the farthest one have no azimuth."""
+
+
+def plan(
+    team: Team,
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    *,
+    lean: float = LEAN,
+    widest: float = math.radians(60.0),
+    distance: ArrayLike = 0.0,
+    downwash: float = 2.0,
+) -> tuple[Array, Array]:
+    """Directions (n, 3), from drone to load, and tensions (n,), N, that hold the load in this attitude.
+
+    Parameters
+    ----------
+    team : Team
+        Drones and load; without a body, a ring on a point.
+    attitude : (4,) array
+        Of the load, unit quaternion wxyz.
+    lean, widest : float
+        Angle of the cables from the vertical, rad, and how far it may grow where drones would be too near.
+    distance : float or (n,) array
+        Between drones, m: two keep the mean of theirs.
+    downwash : float
+        How much more of it drones keep above each other than beside each other.
+
+    Returns
+    -------
+    (directions, tensions)
+        What no formation holds, such as a load whose weight lies outside of its attachments, is held as far as it can be.
+
+    """
+    arms = team.levers @ matrix_of(attitude).T
+    weight = team.load_mass * max(team.gravity, 1e-3)
+    sizes = np.broadcast_to(np.asarray(distance, dtype=float), team.n)
+    needed = SPARE * 0.5 * (sizes[:, None] + sizes[None, :])
+    best, most = None, -math.inf
+    for angle in np.arange(min(lean, widest), widest + 1e-9, WIDER):
+        found = _held(arms, _outward(arms, team.cable_lengths, float(angle)), weight)
+        ratio = _clearance(arms, team.cable_lengths, found, needed, downwash)
+        if ratio > most:
+            best, most = found, ratio
+        if ratio >= 1.0:
+            break
+    assert best is not None
+    tensions = np.linalg.norm(best, axis=1)
+    return np.asarray(best / tensions[:, None]), np.asarray(tensions)
+
+
+def wrench_map(arms: Array) -> Array:
+    """Matrix (6, 3 n) from cable forces to their sum and their moment, for ends at ``arms`` (n, 3)."""
+    x, y, z = arms.T
+    zero = np.zeros_like(x)
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])  # (3, 3, n)
+    force = np.broadcast_to(np.eye(3)[:, :, None], cross.shape)
+    return np.concatenate([force, cross]).transpose(0, 2, 1).reshape(6, -1)
+
+
+def _outward(arms: Array, lengths: Array, angle: float) -> Array:
+    """Directions (n, 3) that lean by ``angle`` from the vertical, towards a ring of drones."""
+    n = len(arms)
+    level = arms[:, :2] - arms[:, :2].mean(axis=0)
+    radii = np.linalg.norm(level, axis=1)
+    if radii.max() < 1e-9:
+        return ring(n, angle)
+    around = np.flatnonzero(radii > MIDDLE * radii.max())
+    azimuth = np.arctan2(level[around, 1], level[around, 0])
+    order = around[np.argsort(azimuth, kind="stable")]
+    azimuth = np.sort(azimuth)
+    steps = 2.0 * np.pi * np.arange(len(order)) / len(order)
+    start = np.angle(np.mean(np.exp(1j * (azimuth - steps))))
+    circle = radii.max() + np.max(lengths) * math.sin(angle)
+    places = circle * np.column_stack([np.cos(start + steps), np.sin(start + steps)])
+    outward = np.zeros((n, 2))
+    outward[order] = places - level[order]
+    size = np.linalg.norm(outward, axis=1, keepdims=True)
+    outward /= np.where(size > 0.0, size, 1.0)
+    directions = np.empty((n, 3))
+    directions[:, :2] = -math.sin(angle) * outward
+    directions[:, 2] = -np.sqrt(1.0 - np.sum(directions[:, :2] ** 2, axis=1))
+    return directions
+
+
+def _held(arms: Array, directions: Array, weight: float) -> Array:
+    """Cable forces (n, 3) near these directions that balance the weight."""
+    n = len(arms)
+    floor = FLOOR * weight / n
+    upright = np.full(n, weight / n)
+    free = np.ones(n, dtype=bool)
+    for _ in range(n):
+        rows = np.vstack([np.ones(n), arms[:, 0], arms[:, 1]])
+        wanted = np.array([weight, 0.0, 0.0]) - rows @ upright
+        step = np.linalg.lstsq(rows[:, free], wanted, rcond=1e-9)[0]
+        upright[free] += step
+        low = free & (upright < floor)
+        upright[low] = floor
+        if not low.any() or low.sum() == free.sum():
+            break
+        free &= ~low
+    forces = directions * (upright / -directions[:, 2])[:, None]
+    balance = wrench_map(arms)
+    wanted = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0]) - balance @ forces.ravel()
+    step = np.linalg.lstsq(balance, wanted, rcond=1e-9)[0].reshape(n, 3)
+    corrected = forces + step
+    return corrected if np.all(-corrected[:, 2] > 0.5 * floor) else forces
+
+
+def _clearance(arms: Array, lengths: Array, forces: Array, needed: Array, downwash: float) -> float:
+    """Least distance of two drones over what is needed."""
+    n = len(arms)
+    if n < 2 or not needed.any():
+        return math.inf
+    drones = arms - lengths[:, None] * forces / np.linalg.norm(forces, axis=1, keepdims=True)
+    apart = (drones[:, None, :] - drones[None, :, :]) / np.array([1.0, 1.0, downwash])
+    i, j = np.triu_indices(n, k=1)
+    needs = needed[i, j]
+    ratio = np.linalg.norm(apart[i, j], axis=1)[needs > 0.0] / needs[needs > 0.0]
+    return float(ratio.min(initial=math.inf))
