@@ -40,10 +40,9 @@ class Judged(NamedTuple):
 
 
 def loops_of(mission: Mission) -> list[Judged]:
-    """The margins of attitude, position and load, from the inside out; what has no linear law of its own, or carries a load with an
-    extent, is left out.
+    """The margins of attitude, position and load, from the inside out.
 
-    An unstable loop is the last one: those around it have no margin.
+    What has no linear law of its own, or carries a load with an extent, is left out. An unstable loop is the last one: those around it have no margin.
     """
     drones = mission.first_drones()
     told, true = mission.team.of(drones), mission.true_team.of(drones)
