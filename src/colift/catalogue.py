@@ -104,14 +104,16 @@ def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
     named = {of: table(of).get("kind") for of in (*FORMATION, "supervision", "sensing")}
     stands = table("start").get("on_ground") is True
     asked = any(
-        named[of] not in (None, FORMATION[of]) for of in ("load_control", "position_control")
+        named[of] not in (None, FORMATION[of], TURNING[of])
+        for of in ("load_control", "position_control")
     )
-    formation = stands or any(named[of] == own for of, own in FORMATION.items())
+    turns = table("load").get("kind") == RIGID
+    formation = stands or turns or any(named[of] == own for of, own in FORMATION.items())
     drones = table("drones")
     count = drones.get("count", 4)
     papers = drones.keys() <= {*UNNUMBERED} and isinstance(count, int) and count >= 3
     tracking = asked or (papers and not formation and named["supervision"] != LEADING)
-    if table("load").get("kind") == RIGID and layer in TURNING:
+    if turns and layer in TURNING:
         return TURNING[layer]
     if layer in TRACKING and tracking:
         return TRACKING[layer]

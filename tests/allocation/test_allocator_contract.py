@@ -137,7 +137,7 @@ def test_a_force_that_is_not_finite_repeats_the_last_answer(kind):
 
 
 def test_no_force_needs_no_tension(kind):
-    if kind == "safe":
+    if kind in ("safe", "safe-wrench"):
         pytest.skip("holds its least tension instead")
     cell = Cell(kind, 4)
     cell(GOOD)

@@ -17,6 +17,7 @@ from colift.control.allocation.base import (
     INFO_OBJECTIVE,
     INFO_RESIDUAL,
     SIGNATURE,
+    Allocator,
     AllocatorPart,
     Status,
 )
@@ -83,9 +84,24 @@ INSIDE = 0.05
 """Of the largest turn, how far inside of a cone a start is."""
 AHEAD = 1.5
 """Of the wanted attitude's next turn, what distances and cones keep for it."""
+WITH_LOAD = 0.4
+"""Part of the largest turn by which the last cables turn with the wanted attitude before anything else."""
 BUFFER, BUFFER_ANGLE = 1e-3, math.radians(0.1)
 """What they keep anyhow, m, rad."""
+FADE = 0.75
+"""Part of what is left of it that a pair keeps within a cycle, where its buffer is used up."""
 ROUNDING = 1e-9
+ANY = 1e6
+"""Force that nothing limits, N."""
+STEEP = 5.0
+"""Angle of a plan's cables that needs little thrust, degrees."""
+RECOVERY = 5.0
+"""Time in which a start that breaks a limit must be led back, s."""
+BROKEN = {
+    4: "max_cone_deg", 16: "max_thrust", 32: "max_tilt_deg", 128: "min_distance", 256: "cable_distance", 512: "box_deg",
+    1024: "cable_gap",
+}  # fmt: skip
+"""Settings by their bit of ``active_limits``."""
 COUPLED = 4
 """Most pairs in a step's matrix, for each cable; others only shorten the step."""
 
@@ -117,8 +133,21 @@ def lead_in(c, ax, ay, az, tan, turn, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inline
-def fly(n, unit, wx, wy, wz, params, data):  # type: ignore[no-untyped-def]
-    """What every drone needs for itself, brought within what it can do; (wx, wy, wz) as :func:`ends_accelerate` left them."""
+def turned_by(q, known, w, x, y, z, most):  # type: ignore[no-untyped-def]
+    """Rotation, as a quaternion, from the attitude ``q`` to ``(w, x, y, z)``, by no more than ``most``, rad."""
+    if not known:
+        return 1.0, 0.0, 0.0, 0.0
+    c, u, v, r = quaternion.multiply(w, x, y, z, q[0], -q[1], -q[2], -q[3])
+    side = 2.0 if c >= 0.0 else -2.0
+    u, v, r = side * u, side * v, side * r
+    size = math.sqrt(u * u + v * v + r * r)
+    scale = most / size if size > most else 1.0
+    return quaternion.turn(1.0, 0.0, 0.0, 0.0, scale * u, scale * v, scale * r)
+
+
+@inline
+def fly(n, unit, params, data):  # type: ignore[no-untyped-def]
+    """What every drone needs for itself, brought within what it can do, from what :func:`accelerate` left."""
     for i in range(n):
         d = WIDTH * i
         mass = column(params, P.rows, n, PLACES.m)[i] * unit
@@ -187,13 +216,14 @@ def between(kind, i, j, flat, length, data):  # type: ignore[no-untyped-def]
 def watch(n, delta, ahead, moved, params, length, rest, pairs, data):  # type: ignore[no-untyped-def]
     """List the pairs that may come too near in this cycle, where they start; their number.
 
-    ``rest`` (n (n - 1) / 2) is how much nearer each pair may surely come, from the last time that it was looked at; ``moved`` has what
-    has been used of it by each cable. Those that are too near already are pushed apart, by no more than half of a turn.
+    ``rest`` (n (n - 1) / 2) is how much nearer each pair may surely come, from the last time that it was looked at; ``moved`` (n + 1)
+    how far each drone has gone since the last cycle, m, and the load has turned, rad. Who lacks room is pushed apart.
     """
     flat = params[P.flat]
     kinds = metres.KINDS if params[P.rods] != 0.0 else 1
     m = 0
     at = 0
+    close = wrong = False
     for i in range(n):
         d = WIDTH * i
         for j in range(i):
@@ -203,7 +233,7 @@ def watch(n, delta, ahead, moved, params, length, rest, pairs, data):  # type: i
             z = data[d + R.place + 2] - data[e + R.place + 2]
             span = math.sqrt(x * x + y * y + z * z)
             buffer = BUFFER + AHEAD * ahead * span
-            reach = delta * (length[i] + length[j]) + buffer
+            reach = delta * (length[i] + length[j]) + data[d + R.c] + data[e + R.c] + buffer
             rest[at] -= moved[i] + moved[j] + moved[n] * span
             if rest[at] > reach:
                 at += 1
@@ -213,50 +243,61 @@ def watch(n, delta, ahead, moved, params, length, rest, pairs, data):  # type: i
                 least = least_of(kind, i, j, n, params)
                 if least <= 0.0:
                     continue
-                size, nx, ny, nz, _, _ = between(kind, i, j, flat, length, data)
+                size, _, _, _, _, _ = between(kind, i, j, flat, length, data)
                 rest[at] = min(rest[at], size - least)
                 if size - least > reach:
                     continue
                 o = PAIR * m
-                if size <= least * (1.0 + ROUNDING):
-                    size, least, nx, ny, nz = push(
-                        kind, i, j, n, flat, least, size, nx, ny, nz, delta, length, data
-                    )
-                elif size < least + 2.0 * buffer:
-                    least = min(least + buffer, size - 0.25 * (size - least))
-                else:
-                    least += buffer
                 pairs[o + V.kind], pairs[o + V.i], pairs[o + V.j] = kind, i, j
-                pairs[o + V.least], pairs[o + V.g] = least, size - least
-                pairs[o + V.normal] = nx
-                pairs[o + V.normal + 1] = ny
-                pairs[o + V.normal + 2] = nz
+                pairs[o + V.least], pairs[o + V.g], pairs[o + V.z] = least, size, buffer
+                wrong = wrong or size <= least * (1.0 + ROUNDING)
+                close = close or size < least + buffer
                 m += 1
             at += 1
-    # Who was pushed has changed its other pairs.
+    if close:
+        for i in range(n):
+            for c in range(3):
+                data[WIDTH * i + R.best + c] = data[WIDTH * i + R.w + c]
+        for p in range(m):
+            push(PAIR * p, n, flat, delta, length, pairs, data)
+        worse = False
+        for p in range(m):
+            o = PAIR * p
+            kind, i, j = int(pairs[o + V.kind]), int(pairs[o + V.i]), int(pairs[o + V.j])
+            size, _, _, _, _, _ = between(kind, i, j, flat, length, data)
+            worse = worse or size < 0.5 * (pairs[o + V.g] + pairs[o + V.least])
+        if worse and not wrong:  # what helps one pair would cost another one its room
+            for i in range(n):
+                for c in range(3):
+                    data[WIDTH * i + R.w + c] = data[WIDTH * i + R.best + c]
     for p in range(m):
         o = PAIR * p
-        i, j = int(pairs[o + V.i]), int(pairs[o + V.j])
-        size, nx, ny, nz, _, _ = between(int(pairs[o + V.kind]), i, j, flat, length, data)
-        if size - pairs[o + V.least] < 1e-3 * pairs[o + V.g]:
-            pairs[o + V.least] = size - 1e-6
-        pairs[o + V.g] = size - pairs[o + V.least]
+        kind, i, j = int(pairs[o + V.kind]), int(pairs[o + V.i]), int(pairs[o + V.j])
+        size, nx, ny, nz, _, _ = between(kind, i, j, flat, length, data)
+        least, before, buffer = pairs[o + V.least], pairs[o + V.g], pairs[o + V.z]
+        if size > least + 1e-6:
+            least += min(buffer, FADE * (size - least))
+        elif size > before + 1e-6:
+            least = min(least, before + 0.5 * (size - before))
+        else:
+            least = size - 1e-6
+        pairs[o + V.least], pairs[o + V.g] = least, size - least
         pairs[o + V.normal], pairs[o + V.normal + 1], pairs[o + V.normal + 2] = nx, ny, nz
     return m
 
 
 @inline
-def push(kind, i, j, n, flat, least, size, nx, ny, nz, delta, length, data):  # type: ignore[no-untyped-def]
-    """Push a pair apart that is too near; its new distance, what it keeps from now on, its normal."""
-    _, nx, ny, nz, u, v = between(kind, i, j, flat, length, data)
+def push(o, n, flat, delta, length, pairs, data):  # type: ignore[no-untyped-def]
+    """Turn both cables of a pair apart, by what its buffer lacks, and by no more than half of the largest turn together."""
+    kind, i, j = int(pairs[o + V.kind]), int(pairs[o + V.i]), int(pairs[o + V.j])
+    size, nx, ny, nz, u, v = between(kind, i, j, flat, length, data)
+    lack = pairs[o + V.least] + pairs[o + V.z] - size
+    if lack <= 0.0:
+        return
     if size < 1e-6:  # no direction is better than another
         nx, ny, nz = math.cos(2.4 * (i + n * j)), math.sin(2.4 * (i + n * j)), 0.0
-    lean(i, -u * nx, -u * ny, -u * nz, 0.25 * delta, data)
-    lean(j, v * nx, v * ny, v * nz, 0.25 * delta, data)
-    after, nx, ny, nz, _, _ = between(kind, i, j, flat, length, data)
-    if after > size:
-        return after, min(least, size + 0.5 * (after - size)), nx, ny, nz
-    return after, after - 1e-6, nx, ny, nz
+    lean(i, -u * nx, -u * ny, -u * nz, min(0.5 * lack / length[i], 0.25 * delta), data)
+    lean(j, v * nx, v * ny, v * nz, min(0.5 * lack / length[j], 0.25 * delta), data)
 
 
 @inline
@@ -296,8 +337,11 @@ def held(tan, ax, ay, az, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inline
-def starts(n, unit, delta, ahead, flying, tensions, directions, params, data):  # type: ignore[no-untyped-def]
-    """Limits of every cable in this cycle and a force strictly inside of them; whether one had to be relaxed."""
+def starts(n, unit, delta, ahead, turning, flying, tensions, directions, params, data):  # type: ignore[no-untyped-def]
+    """Limits of every cable in this cycle and a force strictly inside of them; whether one had to be relaxed.
+
+    It is the last one, turned with the load, which leaves distances as they were.
+    """
     relaxed = False
     turn = 0.5 * delta
     lows = column(params, P.rows, n, PLACES.T_min)
@@ -315,6 +359,7 @@ def starts(n, unit, delta, ahead, flying, tensions, directions, params, data):  
         data[d + R.a], data[d + R.a + 1], data[d + R.a + 2] = x, y, z
         data[d + R.rate] = math.tan(delta)
         ax, ay, az = x, y, z
+        x, y, z = quaternion.into_world(turning[0], turning[1], turning[2], turning[3], x, y, z)
         x, y, z, tan = lead_in(0, 0.0, 0.0, -1.0, params[P.cone], 0.5 * turn, x, y, z)
         data[d + R.cone] = tan
         data[d + R.box] = 0.0
@@ -581,12 +626,13 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     flying = params[P.flying] != 0.0
     if flying:
         accelerate(n, sees.reference, (pw, px, py, pz), rates, arms, data)
-        fly(n, unit, 0.0, 0.0, 0.0, params, data)
-    relaxed = starts(n, unit, delta, ahead, flying, tensions, directions, params, data)
+        fly(n, unit, params, data)
+    q = memory[M.attitude : M.attitude + 4]
+    turning = turned_by(q, memory[M.known] != 0.0, pw, px, py, pz, WITH_LOAD * delta)
+    relaxed = starts(n, unit, delta, ahead, turning, flying, tensions, directions, params, data)
     m = rows = 0
     if params[P.metres] != 0.0:
         rotate = 0.0
-        q = memory[M.attitude : M.attitude + 4]
         if memory[M.known] == 0.0:
             memory[M.known] = 1.0
             for k in range(count):
@@ -597,11 +643,17 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         moved[n] = 2.0 * math.sqrt(rotate)
         q[0], q[1], q[2], q[3] = pw, px, py, pz
         for i in range(n):
-            step = 0.0
+            d = WIDTH * i
+            x, y, z = data[d + R.w], data[d + R.w + 1], data[d + R.w + 2]
+            scale = 1.0 / math.sqrt(x * x + y * y + z * z)
+            step = off = 0.0
             for k in range(3):
-                step += (data[WIDTH * i + R.a + k] - last[3 * i + k]) ** 2
-                last[3 * i + k] = data[WIDTH * i + R.a + k]
+                now_at = data[d + R.w + k] * scale
+                step += (now_at - last[3 * i + k]) ** 2
+                off += (now_at - data[d + R.a + k]) ** 2
+                last[3 * i + k] = now_at
             moved[i] = length[i] * math.sqrt(step)
+            data[d + R.c] = length[i] * math.sqrt(off)
         m = watch(n, delta, ahead, moved, params, length, rest, pairs, data)
         rows = min(m, most_rows)
 
@@ -763,7 +815,7 @@ class SafeWrench(AllocatorPart):
             f"tension_min = {low[i]:.4g} conflicts with tension_max = {high[i]:.4g}: "
             "each cable needs tension_max of at least 1.2 tension_min"
         )
-        return [("tension_min" if self.tension_max is None else "tension_max", message)]
+        return [("tension_max" if self.tension_min is None else "tension_min", message)]
 
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
         most = self.thrust_limits(team)
@@ -780,6 +832,23 @@ class SafeWrench(AllocatorPart):
     def thrust_limits(self, team: Team) -> Vector:
         """Largest thrust of each drone (n,) as far as the allocator is told, N; inf: not limited."""
         return self.settled("max_thrust", team)
+
+    def with_any_thrust(self, team: Team) -> SafeWrench:
+        free = {"max_thrust", "tension_max"} & {*self.by_team(team)}
+        return self.model_copy(update={**dict.fromkeys(free, ANY), "cone_deg": STEEP})
+
+    def cannot_start(self, team: Team, directions: Array) -> str:
+        allocator = Allocator(self, team)
+        allocator.reset(directions)
+        for _ in range(round(RECOVERY / allocator.dt)):
+            answer = allocator.allocate([0.0, 0.0, team.load_mass * team.gravity])
+            if answer.status is not Status.RECOVERING:
+                return ""
+        names = [name for bit, name in BROKEN.items() if answer.active_limits & bit]
+        return (
+            f"breaks a limit and cannot be led back: after {RECOVERY:g} s of hover the {team.n} cables would still break "
+            f"{', '.join(names)}: start within the limits, or ask for less"
+        )
 
     def turn_rate(self, team: Team) -> float:
         """Fastest turn of a cable's direction, rad/s."""

@@ -20,9 +20,10 @@ from pydantic import Field
 
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
 from colift.control.tuning import Delays, sway
-from colift.kernel.jit import inline, kernel
+from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
+from colift.kernel.math.small import cross, matrix_times
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
 from colift.team import Team
@@ -36,21 +37,6 @@ PARAMS = Layout(
 MEMORY = Layout(team={"push": 3, "moment": 3})
 """Filtered external force on the load, N; integral part of the moment, in its frame, N m."""
 P, M = PARAMS.at, MEMORY.at
-
-
-@inline
-def _cross(a, b):  # type: ignore[no-untyped-def]
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inline
-def _times(o, params, v):  # type: ignore[no-untyped-def]
-    """Product of the inertia with a vector of the load's frame."""
-    return (
-        params[o] * v[0] + params[o + 1] * v[1] + params[o + 2] * v[2],
-        params[o + 3] * v[0] + params[o + 4] * v[1] + params[o + 5] * v[2],
-        params[o + 6] * v[0] + params[o + 7] * v[1] + params[o + 8] * v[2],
-    )
 
 
 @kernel(SIGNATURE)
@@ -76,11 +62,13 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     e_R = (-2.0 * ew * ex, -2.0 * ew * ey, -2.0 * ew * ez)
     e_W = (Omega[0] - wanted[0], Omega[1] - wanted[1], Omega[2] - wanted[2])
     J = P.J
-    gyration = _cross(Omega, _times(J, params, Omega))
-    ahead = _cross(Omega, wanted)
-    ahead = _times(J, params, (turning[0] - ahead[0], turning[1] - ahead[1], turning[2] - ahead[2]))
-    turn = _times(J, params, e_R)
-    spin = _times(J, params, e_W)
+    gyration = cross(Omega, matrix_times(J, params, Omega))
+    ahead = cross(Omega, wanted)
+    ahead = matrix_times(
+        J, params, (turning[0] - ahead[0], turning[1] - ahead[1], turning[2] - ahead[2])
+    )
+    turn = matrix_times(J, params, e_R)
+    spin = matrix_times(J, params, e_W)
     stands = sees.standing[last] != 0.0
     moment = writes.moment
     for k in range(3):
@@ -95,13 +83,13 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 
     # The centre of mass, as it is and as it should be.
     at = quaternion.into_world(q[0], q[1], q[2], q[3], c[0], c[1], c[2])
-    flow = _cross(Omega, c)
+    flow = cross(Omega, c)
     speed = quaternion.into_world(q[0], q[1], q[2], q[3], flow[0], flow[1], flow[2])
     at_d = quaternion.into_world(q_d[0], q_d[1], q_d[2], q_d[3], c[0], c[1], c[2])
     o, o1 = (w_d[0, 0], w_d[0, 1], w_d[0, 2]), (w_d[1, 0], w_d[1, 1], w_d[1, 2])
-    flow_d = _cross(o, c)
+    flow_d = cross(o, c)
     speed_d = quaternion.into_world(q_d[0], q_d[1], q_d[2], q_d[3], flow_d[0], flow_d[1], flow_d[2])
-    bend, twist = _cross(o, flow_d), _cross(o1, c)
+    bend, twist = cross(o, flow_d), cross(o1, c)
     motion = quaternion.into_world(
         q_d[0], q_d[1], q_d[2], q_d[3], bend[0] + twist[0], bend[1] + twist[1], bend[2] + twist[2]
     )  # fmt: skip

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from colift.kernel.jit import aside, inline, kernel
 from colift.kernel.load import ends_of
 from colift.kernel.math import quaternion
+from colift.kernel.math.small import matrix_times
 from colift.kernel.math.winch import paid_out
 from colift.part import Places, Vector
 from colift.team import Body, Ground, Team
@@ -29,7 +30,6 @@ from colift.world.plant._load import (
     end_speed,
     into_load,
     into_world,
-    matrix_times,
     speed_at,
     spin,
 )
@@ -144,7 +144,7 @@ def yielding(i, y, ax, ay, az, params):  # type: ignore[no-untyped-def]
     a, b, c = params[o], params[o + 1], params[o + 2]
     u, v, w = into_load(y, ax, ay, az)
     mx, my, mz = b * w - c * v, c * u - a * w, a * v - b * u
-    tx, ty, tz = matrix_times(P.inverse, mx, my, mz, params)
+    tx, ty, tz = matrix_times(P.inverse, params, (mx, my, mz))
     return 1.0 / params[P.m_L] + mx * tx + my * ty + mz * tz
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from colift.kernel.jit import aside, inline
 from colift.kernel.math import quaternion
+from colift.kernel.math.small import matrix_times
 from colift.world.plant._params import BODY, MASS, P
 
 TURN, SPIN = 6, 10
@@ -78,16 +79,6 @@ def end_acceleration(i, y, dy, params):  # type: ignore[no-untyped-def]
     return dy[3] + x, dy[4] + y_, dy[5] + z
 
 
-@inline
-def matrix_times(at, a, b, c, params):  # type: ignore[no-untyped-def]
-    """Product of the (3, 3) matrix at a place in the parameters with a vector."""
-    return (
-        params[at] * a + params[at + 1] * b + params[at + 2] * c,
-        params[at + 3] * a + params[at + 4] * b + params[at + 5] * c,
-        params[at + 6] * a + params[at + 7] * b + params[at + 8] * c,
-    )
-
-
 @aside
 def _turn_freely(y, params, dy):  # type: ignore[no-untyped-def]
     p, q, r = y[SPIN], y[SPIN + 1], y[SPIN + 2]
@@ -95,10 +86,10 @@ def _turn_freely(y, params, dy):  # type: ignore[no-untyped-def]
         y[6], y[7], y[8], y[9], 0.0, 0.5 * p, 0.5 * q, 0.5 * r
     )  # fmt: skip
     dy[6], dy[7], dy[8], dy[9] = dw, dx, dy_, dz
-    hx, hy, hz = matrix_times(P.inertia, p, q, r, params)
+    hx, hy, hz = matrix_times(P.inertia, params, (p, q, r))
     ax, ay, az = matrix_times(
-        P.inverse, r * hy - q * hz, p * hz - r * hx, q * hx - p * hy, params
-    )  # fmt: skip
+        P.inverse, params, (r * hy - q * hz, p * hz - r * hx, q * hx - p * hy)
+    )
     dy[SPIN], dy[SPIN + 1], dy[SPIN + 2] = ax, ay, az
 
 
@@ -115,7 +106,7 @@ def spin(y, params, dy):  # type: ignore[no-untyped-def]
 @inline
 def twist(a, b, c, params, y):  # type: ignore[no-untyped-def]
     """Add what a moment, or an angular impulse, about the centre of mass does to the rates; all in the load's frame."""
-    x, y_, z = matrix_times(P.inverse, a, b, c, params)
+    x, y_, z = matrix_times(P.inverse, params, (a, b, c))
     y[SPIN] += x
     y[SPIN + 1] += y_
     y[SPIN + 2] += z

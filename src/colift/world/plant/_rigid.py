@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from colift.kernel.jit import aside, inline
 from colift.kernel.math import quaternion
-from colift.kernel.math.small import solve_symmetric
+from colift.kernel.math.small import matrix_times, solve_symmetric
 from colift.world.plant._bodies import (
     BODY,
     DRONE,
@@ -32,7 +32,7 @@ from colift.world.plant._bodies import (
     parting_speed,
 )
 from colift.world.plant._contact import touch
-from colift.world.plant._load import end_acceleration, into_load, matrix_times
+from colift.world.plant._load import end_acceleration, into_load
 from colift.world.plant._params import P
 
 
@@ -103,7 +103,7 @@ def moment_of(n, y, alpha, T, params):  # type: ignore[no-untyped-def]
     for i in range(n):
         _, _, _, p, q, r = lever(i, y, alpha, params)
         mx, my, mz = mx + T[i] * p, my + T[i] * q, mz + T[i] * r
-    return matrix_times(P.inverse, mx, my, mz, params)
+    return matrix_times(P.inverse, params, (mx, my, mz))
 
 
 @inline

@@ -42,7 +42,7 @@ LIMITS = 7
 ROW = Layout(
     team={
         "a": 3, "T_min": 1, "T_max": 1, "cone": 1, "rate": 1, "box": 4, "own": 3, "f_max": 1, "tilt": 1,
-        "home": 3, "end": 3, "place": 3, "g": LIMITS, "z": LIMITS, "H": 6, "b": 3, "w": 3, "dw": 3, "force": 3,
+        "home": 3, "end": 3, "place": 3, "g": LIMITS, "z": LIMITS, "dz": LIMITS, "slope": 3 * LIMITS, "H": 6, "b": 3, "c": 3, "w": 3, "dw": 3, "force": 3, "best": 3,
     }
 )  # fmt: skip
 """Of one cable. ``cone``, ``rate``, ``tilt`` and the first of ``box`` are the tangents of half-angles, 0 where there is no limit."""
@@ -57,8 +57,6 @@ PAIR = V.rows
 
 KEEP = 0.05
 """Part of the way to the nearest rim that a step leaves."""
-BAND = 30.0
-"""Multipliers stay within this factor of their central values."""
 YIELD = 0.7
 """Part of a price from which on the cost becomes slight: the wrench may be about to give way."""
 SLIGHT = 0.01
@@ -70,32 +68,31 @@ FLOOR = 1e-9
 """Smallest barrier, in squared shares."""
 BALANCED = 1e-10
 """Missing wrench that counts as none, in shares."""
+NEAR = 10.0
+"""Squared residual over the barrier, up to which the barrier may shrink: rims are curved, and steps along them have to stay inside."""
 TRIES = 8
 CONVERGED, STOPPED = 0, 1
 
 
 @inline
-def add(d, k, g, x, y, z, kappa, before, s, fresh, data):  # type: ignore[no-untyped-def]
+def add(d, k, g, x, y, z, mu, fresh, data):  # type: ignore[no-untyped-def]
     """One limit with its gradient into a cable's matrix and right-hand side; its multiplier."""
-    if fresh:
-        m = kappa / g
-    else:
-        old, m = data[d + R.g + k], data[d + R.z + k]
-        m += s * (before / old - m) - m * (g - old) / old
-        central = before / g
-        m = min(max(m, central / BAND), central * BAND)
+    m = mu / g if fresh else data[d + R.z + k]
     data[d + R.g + k] = g
     data[d + R.z + k] = m
-    stiff, push = m / g, kappa / g
+    o = d + R.slope + 3 * k
+    data[o], data[o + 1], data[o + 2] = x, y, z
+    push = 1.0 / g
+    stiff = m * push
     data[d + R.H] += stiff * x * x
     data[d + R.H + 1] += stiff * x * y
     data[d + R.H + 2] += stiff * x * z
     data[d + R.H + 3] += stiff * y * y
     data[d + R.H + 4] += stiff * y * z
     data[d + R.H + 5] += stiff * z * z
-    data[d + R.b] += push * x
-    data[d + R.b + 1] += push * y
-    data[d + R.b + 2] += push * z
+    data[d + R.c] += push * x
+    data[d + R.c + 1] += push * y
+    data[d + R.c + 2] += push * z
     data[d + R.force] -= m * x
     data[d + R.force + 1] -= m * y
     data[d + R.force + 2] -= m * z
@@ -103,7 +100,7 @@ def add(d, k, g, x, y, z, kappa, before, s, fresh, data):  # type: ignore[no-unt
 
 
 @inline
-def add_cone(d, k, tan, ax, ay, az, wx, wy, wz, side, kappa, before, s, fresh, data):  # type: ignore[no-untyped-def]
+def add_cone(d, k, tan, ax, ay, az, wx, wy, wz, side, mu, fresh, data):  # type: ignore[no-untyped-def]
     """A cone about the unit ``a`` that holds ``w``; ``side`` is -1 where ``w`` is the cable's force turned about."""
     t = ax * wx + ay * wy + az * wz
     inverse = 1.0 / t
@@ -113,9 +110,7 @@ def add_cone(d, k, tan, ax, ay, az, wx, wy, wz, side, kappa, before, s, fresh, d
     g = half * t * (tan * tan - square)
     c = half * (tan * tan + square) * side
     e = -2.0 * half * side
-    m = add(
-        d, k, g, c * ax + e * yx, c * ay + e * yy, c * az + e * yz, kappa, before, s, fresh, data
-    )
+    m = add(d, k, g, c * ax + e * yx, c * ay + e * yy, c * az + e * yz, mu, fresh, data)
     # -g'' = (I - a a' - y a' - a y' + |y|^2 a a') / (t tan)
     m *= 2.0 * half * inverse
     c = square - 1.0
@@ -128,19 +123,19 @@ def add_cone(d, k, tan, ax, ay, az, wx, wy, wz, side, kappa, before, s, fresh, d
 
 
 @inline
-def add_ball(d, k, size, x, y, z, side, kappa, before, s, fresh, data):  # type: ignore[no-untyped-def]
+def add_ball(d, k, size, x, y, z, side, mu, fresh, data):  # type: ignore[no-untyped-def]
     """A ball about the origin that holds ``(x, y, z)``."""
     inverse = 1.0 / size
     g = 0.5 * inverse * (size * size - x * x - y * y - z * z)
     c = -inverse * side
-    m = add(d, k, g, c * x, c * y, c * z, kappa, before, s, fresh, data) * inverse
+    m = add(d, k, g, c * x, c * y, c * z, mu, fresh, data) * inverse
     data[d + R.H] += m
     data[d + R.H + 3] += m
     data[d + R.H + 5] += m
 
 
 @inline
-def assemble(n, flying, cost, kappa, before, s, fresh, data):  # type: ignore[no-untyped-def]
+def assemble(n, flying, cost, mu, fresh, data):  # type: ignore[no-untyped-def]
     """Every cable's matrix, right-hand side and what its limits and cost push with, where it is now."""
     for i in range(n):
         d = WIDTH * i
@@ -152,24 +147,21 @@ def assemble(n, flying, cost, kappa, before, s, fresh, data):  # type: ignore[no
         for k in range(3):
             pull = cost * (data[d + R.w + k] - data[d + R.home + k])
             data[d + R.b + k] = -pull
+            data[d + R.c + k] = 0.0
             data[d + R.force + k] = pull
-        add_ball(d, T_MAX, data[d + R.T_max], x, y, z, 1.0, kappa, before, s, fresh, data)
+        add_ball(d, T_MAX, data[d + R.T_max], x, y, z, 1.0, mu, fresh, data)
         t = ax * x + ay * y + az * z
-        add(d, T_MIN, t - data[d + R.T_min], ax, ay, az, kappa, before, s, fresh, data)
-        add_cone(
-            d, CONE, data[d + R.cone], 0.0, 0.0, -1.0, x, y, z, 1.0, kappa, before, s, fresh, data
-        )
-        add_cone(d, RATE, data[d + R.rate], ax, ay, az, x, y, z, 1.0, kappa, before, s, fresh, data)
+        add(d, T_MIN, t - data[d + R.T_min], ax, ay, az, mu, fresh, data)
+        add_cone(d, CONE, data[d + R.cone], 0.0, 0.0, -1.0, x, y, z, 1.0, mu, fresh, data)
+        add_cone(d, RATE, data[d + R.rate], ax, ay, az, x, y, z, 1.0, mu, fresh, data)
         if data[d + R.box] > 0.0:
             bx, by, bz = data[d + R.box + 1], data[d + R.box + 2], data[d + R.box + 3]
-            add_cone(
-                d, BOX, data[d + R.box], bx, by, bz, x, y, z, 1.0, kappa, before, s, fresh, data
-            )
+            add_cone(d, BOX, data[d + R.box], bx, by, bz, x, y, z, 1.0, mu, fresh, data)
         if flying:
             px, py, pz = data[d + R.own] - x, data[d + R.own + 1] - y, data[d + R.own + 2] - z
-            add_ball(d, POWER, data[d + R.f_max], px, py, pz, -1.0, kappa, before, s, fresh, data)
+            add_ball(d, POWER, data[d + R.f_max], px, py, pz, -1.0, mu, fresh, data)
             add_cone(
-                d, TILT, data[d + R.tilt], 0.0, 0.0, 1.0, px, py, pz, -1.0, kappa, before, s, fresh, data
+                d, TILT, data[d + R.tilt], 0.0, 0.0, 1.0, px, py, pz, -1.0, mu, fresh, data
             )  # fmt: skip
 
 
@@ -204,7 +196,7 @@ def times(h, x, y, z, data):  # type: ignore[no-untyped-def]
 
 
 @inline
-def couple(n, size, S, right, data):  # type: ignore[no-untyped-def]
+def couple(n, size, mu, S, right, data):  # type: ignore[no-untyped-def]
     """The six rows of the wrench: ``sum G K G^T`` into the lower half of S and ``sum G K b`` into ``right``."""
     for k in range(6):
         right[k] = 0.0
@@ -241,6 +233,8 @@ def couple(n, size, S, right, data):  # type: ignore[no-untyped-def]
         S[5 * size + 3] += y * azz - z * azy
         S[5 * size + 4] += z * azx - x * azz
         S[5 * size + 5] += x * azy - y * azx
+        for k in range(3):
+            data[d + R.b + k] += mu * data[d + R.c + k]
         bx, by, bz = times(h, data[d + R.b], data[d + R.b + 1], data[d + R.b + 2], data)
         right[0] += bx
         right[1] += by
@@ -389,6 +383,42 @@ def to_the_rim(n, flying, data):  # type: ignore[no-untyped-def]
 
 
 @inline
+def turn_multipliers(n, flying, m, mu, y, pairs, data):  # type: ignore[no-untyped-def]
+    """Steps of all limits' multipliers; the longest one that leaves them positive."""
+    far = 1e300
+    for i in range(n):
+        d = WIDTH * i
+        x, y_, z = data[d + R.dw], data[d + R.dw + 1], data[d + R.dw + 2]
+        for k in range(LIMITS if flying else POWER):
+            if k == BOX and data[d + R.box] <= 0.0:
+                continue
+            o = d + R.slope + 3 * k
+            m_now, g = data[d + R.z + k], data[d + R.g + k]
+            change = data[o] * x + data[o + 1] * y_ + data[o + 2] * z
+            step = (mu - m_now * change) / g - m_now
+            data[d + R.dz + k] = step
+            if step < -m_now * 1e-12:
+                far = min(far, -m_now / step)
+    for p in range(m):
+        step = y[6 + p] - pairs[PAIR * p + V.z]
+        if step < 0.0:
+            far = min(far, -pairs[PAIR * p + V.z] / step)
+    return far
+
+
+@inline
+def move_multipliers(n, flying, m, s, y, pairs, data):  # type: ignore[no-untyped-def]
+    """Take that step."""
+    for i in range(n):
+        d = WIDTH * i
+        for k in range(LIMITS if flying else POWER):
+            if k != BOX or data[d + R.box] > 0.0:
+                data[d + R.z + k] += s * data[d + R.dz + k]
+    for p in range(m):
+        pairs[PAIR * p + V.z] += s * (y[6 + p] - pairs[PAIR * p + V.z])
+
+
+@inline
 def margin(o, flat, s, pairs, length, data):  # type: ignore[no-untyped-def]
     """Distance less what is to be kept of a pair after a step s, m."""
     d, e = WIDTH * int(pairs[o + V.i]), WIDTH * int(pairs[o + V.j])
@@ -415,7 +445,7 @@ def drone(d, s, length, data):  # type: ignore[no-untyped-def]
 
 
 @inline
-def assemble_pairs(m, flat, kappa, before, s, fresh, pairs, length, data):  # type: ignore[no-untyped-def]
+def assemble_pairs(m, flat, mu, fresh, pairs, length, data):  # type: ignore[no-untyped-def]
     """Margins, multipliers and gradients of near pairs, and of their curvature what makes a cable's matrix stiffer."""
     for p in range(m):
         o = PAIR * p
@@ -429,12 +459,7 @@ def assemble_pairs(m, flat, kappa, before, s, fresh, pairs, length, data):  # ty
             px, py, pz, qx, qy, qz,
         )  # fmt: skip
         g = max(size - pairs[o + V.least], 1e-12)
-        if fresh:
-            z = kappa / g
-        else:
-            old, z = pairs[o + V.g], pairs[o + V.z]
-            z += s * (before / old - z) - z * (g - old) / old
-            z = min(max(z, before / g / BAND), before / g * BAND)
+        z = mu / g if fresh else pairs[o + V.z]
         pairs[o + V.g], pairs[o + V.z] = g, z
         pairs[o + V.normal], pairs[o + V.normal + 1], pairs[o + V.normal + 2] = nx, ny, nz
         for side in range(2):
@@ -517,40 +542,53 @@ def iterate(n, flying, m, rows, task, lost, prices, f, work, info):  # type: ign
         room = mu / prices[k]
         plus[k] = max(miss[k], 0.0) + room
         minus[k] = max(-miss[k], 0.0) + room
-    cost, before, s = 1.0, mu, 1.0
+    cost, s = 1.0, 1.0
     fresh = True
     outcome = STOPPED
     iterations = 0
-    residual = math.inf
-    settling = 0
-    hard = False
+    residual = least_loss = math.inf
+    hard = near = False
     while True:
-        assemble(n, flying, cost, mu, before, s, fresh, data)
-        assemble_pairs(rows, flat, mu, before, s, fresh, pairs, length, data)
+        assemble(n, flying, cost, mu, fresh, data)
+        assemble_pairs(rows, flat, mu, fresh, pairs, length, data)
         fresh = False
+        balance = loss = used = size_of = 0.0
+        for k in range(6):
+            balance = max(balance, abs(miss[k]))
+            loss += prices[k] * abs(miss[k])
+            used = max(used, abs(lam[k]) / prices[k])
+            size_of = max(size_of, abs(lam[k]))
+        if loss < least_loss:
+            least_loss = loss
+            for i in range(n):
+                for k in range(3):
+                    data[WIDTH * i + R.best + k] = data[WIDTH * i + R.w + k]
         if iterations > 0:
             residual = stationarity(n, lam, data)
-            balance = loss = used = 0.0
-            for k in range(6):
-                balance = max(balance, abs(miss[k]))
-                loss += prices[k] * abs(miss[k])
-                used = max(used, abs(lam[k]) / prices[k])
+            near = residual * residual <= NEAR * mu * (1.0 + size_of)
             if mu <= end and residual <= tolerance and balance <= BALANCED:
                 outcome = CONVERGED
                 break
-            if used > FIRM and s >= 0.9 and total * mu <= SHARE * loss and settling > 0:
+            if used > FIRM and near and s > 0.9 and total * mu <= SHARE * loss:
                 outcome = CONVERGED
                 break
-            if used > FIRM and s >= 0.9 and total * mu <= SHARE * loss:
-                settling += 1
-        if iterations >= most:
-            break
+            if iterations >= most:
+                break
+            least = end
+            if used > YIELD:
+                cost = SLIGHT
+                least = max(min(end, 0.5 * SHARE * loss / total), FLOOR)
+            if near and s > 0.9:
+                mu *= 0.1
+            elif near and s > 0.5:
+                mu *= 0.3
+            elif s < 0.1:
+                mu = min(2.0 * mu, 1.0)
+            mu = max(mu, least)
         iterations += 1
-        hard = mu <= end and s > 0.9 and iterations > 1
-        for k in range(6):
-            hard = hard and abs(lam[k]) < FIRM * prices[k]
+        hard = mu <= end and near and s > 0.9 and used < FIRM
         invert(n, data)
-        couple(n, size, S, y, data)
+        couple(n, size, mu, S, y, data)
         couple_pairs(n, size, rows, S, y, pairs, mu, data)
         for k in range(6):
             if hard:
@@ -568,7 +606,7 @@ def iterate(n, flying, m, rows, task, lost, prices, f, work, info):  # type: ign
         solve(size, S, y)
         back(n, rows, y, pairs, data)
         far = to_the_rim(n, flying, data)
-        turn = 1e300
+        turn = turn_multipliers(n, flying, rows, mu, y, pairs, data)
         for k in range(6):
             if hard:
                 continue
@@ -586,6 +624,7 @@ def iterate(n, flying, m, rows, task, lost, prices, f, work, info):  # type: ign
                 turn = min(turn, -down / change)
         s = min(1.0, (1.0 - KEEP) * far)
         turn = min(1.0, (1.0 - KEEP) * turn)
+        move_multipliers(n, flying, rows, turn, y, pairs, data)
         if not (s > 0.0 and turn > 0.0):
             break
         for _ in range(TRIES):
@@ -612,7 +651,6 @@ def iterate(n, flying, m, rows, task, lost, prices, f, work, info):  # type: ign
                 else pairs[PAIR * p + V.g]
             )
         missing(n, f, miss, data)
-        slack = 0.0
         for k in range(6):
             change = y[k] - lam[k]
             up, down = prices[k] - lam[k], prices[k] + lam[k]
@@ -624,23 +662,10 @@ def iterate(n, flying, m, rows, task, lost, prices, f, work, info):  # type: ign
                 room = mu / prices[k]
                 plus[k] = max(miss[k], 0.0) + room
                 minus[k] = max(-miss[k], 0.0) + room
-            slack = max(slack, abs(lam[k]) / prices[k])
-        before = mu
-        if slack > YIELD:
-            cost = SLIGHT
-        if s > 0.9:
-            mu *= 0.1
-        elif s > 0.5:
-            mu *= 0.3
-        elif s < 0.1:
-            mu = min(2.0 * mu, 1.0)
-        least = end
-        if slack > YIELD:
-            loss = 0.0
-            for k in range(6):
-                loss += prices[k] * abs(miss[k])
-            least = max(min(end, 0.5 * SHARE * loss / total), FLOOR)
-        mu = max(mu, least)
+    if outcome == STOPPED and loss > least_loss:
+        for i in range(n):
+            for k in range(3):
+                data[WIDTH * i + R.w + k] = data[WIDTH * i + R.best + k]
     info[0] = iterations
     info[1] = residual
     return outcome

@@ -23,7 +23,7 @@ PROOF = 1e-9
 
 
 @inline
-def _farthest(dx, dy, dz, ax, ay, az, turn, cone, best):  # type: ignore[no-untyped-def]
+def farthest(dx, dy, dz, ax, ay, az, turn, cone, best):  # type: ignore[no-untyped-def]
     """Farthest direction along the unit ``d`` within ``turn`` of ``a`` and ``cone`` of the vertical.
 
     It is ``d`` itself, the nearest point of one rim, or a corner where the rims cross. Into ``best``;
@@ -168,7 +168,7 @@ def _prove(  # type: ignore[no-untyped-def]
                 points[count, m] = forces[k, m]
             reach = 0.0
             for i in range(n):
-                far = _farthest(
+                far = farthest(
                     dx, dy, dz, last[k, i, 0], last[k, i, 1], last[k, i, 2], turn, cone, gram[0]
                 )
                 share = t_max[i] if far > 0.0 else t_min[i]
