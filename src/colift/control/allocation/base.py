@@ -172,6 +172,10 @@ class AllocatorPart(Part):
         """Which limits keep the load from being heavier, by name and value, the costliest first."""
         return []
 
+    def turning_lag(self, n: int) -> float | None:
+        """Time constant with which the directions of n cables turn with the force, as a whole, s; None where nobody knows."""
+        return 0.0 if n == 1 else None
+
     def hover(self, team: Team, directions: Array, dt: float) -> Allocation:
         """Its answer to the load's weight once it has settled, from these directions (n, 3); dt in s."""
         allocator = Allocator(self, team, dt=max(dt, HOVER_PERIOD))

@@ -518,6 +518,9 @@ class Safe(AllocatorPart):
         pairs = np.triu_indices(team.n, k=1)
         return bool(np.any(near[pairs] < 0.5 * (sizes[:, None] + sizes[None, :])[pairs]))
 
+    def turning_lag(self, n: int) -> float:
+        return self.turning if n > 1 else 0.0
+
     def params(self, team: Team) -> Vector:
         n = team.n
         angles, causes = self.pair_angles(team)

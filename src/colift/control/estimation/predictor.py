@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic import Field
 
 from colift.control.estimation._cables import load_from_drones
 from colift.control.estimation.base import SIGNATURE, EstimationPart
+from colift.control.margins import Filter
 from colift.control.tuning import lag_warnings, shorter
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
@@ -272,6 +274,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         estimated_load[1, k] = v
 
 
+@cache
 def steady_gains(
     period: float, position: float, velocity: float, unexplained: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -385,6 +388,15 @@ class Predictor(EstimationPart):
             load=self._filter(self.load_position_noise, self.load_velocity_noise),
             drones=self._filter(self.position_noise, self.velocity_noise),
         )  # fmt: skip
+
+    def filters(self) -> tuple[Filter, Filter]:
+        drones, _ = steady_gains(
+            self.period, self.position_noise, self.velocity_noise, self.unexplained
+        )
+        load, _ = steady_gains(
+            self.period, self.load_position_noise, self.load_velocity_noise, self.unexplained
+        )
+        return Filter(drones / self.period, True), Filter(load / self.period, False)
 
     def _filter(self, position: float, velocity: float) -> Vector:
         gain, surprise = steady_gains(self.period, position, velocity, self.unexplained)

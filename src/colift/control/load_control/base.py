@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from colift.control.margins import Hanging
 from colift.kernel.ports import PORTS
 from colift.part import Part
 from colift.team import Team
@@ -28,3 +29,10 @@ class LoadControlPart(Part):
         if team.body is not None and not self.turns:
             return [("kind", "wants no moment: a rigid load needs pose")]
         return super().check(team)
+
+    gain_setting: ClassVar[str] = "kind"
+    """Setting to change where the loop is near instability, for messages."""
+
+    def hanging(self, team: Team, axis: int) -> Hanging | None:
+        """The law for small errors along a horizontal axis of the world, 0 or 1; None where there is no such law."""
+        return None
