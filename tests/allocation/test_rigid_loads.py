@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
 from colift.control.allocation.base import Allocator, Status
+from colift.control.allocation.limits import metres
 from colift.control.allocation.limits.plan import matrix_of, plan, wrench_map
 from colift.control.allocation.safe_wrench import SafeWrench, outward
 from colift.control.allocation.wrench_min_norm import WrenchMinNorm
@@ -324,3 +325,38 @@ def test_limits_that_cross_are_told():
     (problem,) = SafeWrench(max_thrust=5.0).conflicts(team)
     assert "needs a quarter more" in problem[1]
     assert SafeWrench(min_distance=[0.3] * 3).check(team)
+
+
+def test_a_slew_limit_spreads_a_jump_of_the_level_force_over_cycles():
+    team = team_of(4)
+    part = SafeWrench(slew=0.6, max_rate=2.0)
+    allocator = allocator_of(part, team)
+    allocator.allocate([0.0, 0.0, WEIGHT])
+    most = 0.6 * WEIGHT * 2.0 * 0.01
+    for k in range(1, 4):
+        answer = allocator.allocate([2.5 * most, 0.0, WEIGHT])
+        given = -(answer.tensions @ answer.directions)
+        assert_allclose(given, [min(k, 2.5) * most, 0.0, WEIGHT], atol=1e-9)
+        assert answer.status is (Status.FORCE_REDUCED if k < 3 else Status.CONVERGED)
+
+
+@pytest.mark.parametrize("kind", [metres.ROTOR, metres.ROTOR_BACK, metres.CABLES])
+def test_a_distance_is_the_least_of_all_points_and_its_normal_the_slope(kind):
+    rng = np.random.default_rng(kind)
+    steps = np.linspace(0.0, 1.0, 401)
+
+    plain = getattr(metres.apart, "py_func", metres.apart)  # too little to compile it for
+
+    def distance(e, p, q):
+        return plain(kind, 0.25, *e.tolist(), *p.tolist(), *q.tolist())
+
+    for _ in range(30):
+        e, p, q = rng.normal(size=(3, 3))
+        size, *normal, s, t = distance(e, p, q)
+        first = steps[:, None] * p if kind != metres.ROTOR else p[None]
+        second = steps[:, None] * q if kind != metres.ROTOR_BACK else q[None]
+        grid = np.linalg.norm(e + first[:, None] - second[None], axis=2).min()
+        assert grid - 0.01 <= size <= grid + 1e-12
+        d = 1e-6 * rng.normal(size=3)
+        assert_allclose(distance(e, p + d, q)[0] - size, s * np.dot(normal, d), atol=1e-10)
+        assert_allclose(distance(e, p, q + d)[0] - size, -t * np.dot(normal, d), atol=1e-10)
