@@ -341,11 +341,12 @@ def test_a_slew_limit_spreads_a_jump_of_the_level_force_over_cycles():
 
 
 @pytest.mark.parametrize("kind", [metres.ROTOR, metres.ROTOR_BACK, metres.CABLES])
-def test_a_distance_is_the_least_of_all_points_and_its_normal_the_slope(kind):
+def test_a_distance_is_the_least_of_all_points_and_its_normal_the_slope(kind, monkeypatch):
     rng = np.random.default_rng(kind)
     steps = np.linspace(0.0, 1.0, 401)
 
     plain = getattr(metres.apart, "py_func", metres.apart)  # too little to compile it for
+    monkeypatch.setattr(metres, "closest", getattr(metres.closest, "py_func", metres.closest))
 
     def distance(e, p, q):
         return plain(kind, 0.25, *e.tolist(), *p.tolist(), *q.tolist())
