@@ -343,7 +343,7 @@ def test_a_slew_limit_spreads_a_jump_of_the_level_force_over_cycles():
 @pytest.mark.parametrize("kind", [metres.ROTOR, metres.ROTOR_BACK, metres.CABLES])
 def test_a_distance_is_the_least_of_all_points_and_its_normal_the_slope(kind, monkeypatch):
     rng = np.random.default_rng(kind)
-    steps = np.linspace(0.0, 1.0, 401)
+    steps = np.linspace(0.0, 1.0, 101)
 
     plain = getattr(metres.apart, "py_func", metres.apart)  # too little to compile it for
     monkeypatch.setattr(metres, "closest", getattr(metres.closest, "py_func", metres.closest))
@@ -357,7 +357,7 @@ def test_a_distance_is_the_least_of_all_points_and_its_normal_the_slope(kind, mo
         first = steps[:, None] * p if kind != metres.ROTOR else p[None]
         second = steps[:, None] * q if kind != metres.ROTOR_BACK else q[None]
         grid = np.linalg.norm(e + first[:, None] - second[None], axis=2).min()
-        assert grid - 0.01 <= size <= grid + 1e-12
+        assert grid - 0.02 <= size <= grid + 1e-12
         d = 1e-6 * rng.normal(size=3)
         assert_allclose(distance(e, p + d, q)[0] - size, s * np.dot(normal, d), atol=1e-10)
         assert_allclose(distance(e, p, q + d)[0] - size, -t * np.dot(normal, d), atol=1e-10)
