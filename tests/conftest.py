@@ -5,39 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import Counter, defaultdict
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
-LONGEST = (
-    "control/allocation/safe", "flight/loop", "control/supervision/lift", "control/allocation/sqp",
-    "world/sensing/noisy", "world/plant/_chain", "world/plant/slack_cables",
-    "control/estimation/predictor", "world/plant/rigid_cables",
-    "control/position_control/disturbance_observer", "control/position_control/formation",
-)  # fmt: skip
-"""Modules with the kernels that take three quarters of the time to compile, the longest first."""
-
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Before a whole run on several workers, compile these side by side: the workers would each compile all of them."""
+    """Before a whole run on several workers, compile everything on all cores: the workers would wait for each other."""
     config = session.config
     workers = config.getoption("numprocesses", None) or 0
     if workers < 2 or config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
         return
-    from colift.kernel.jit import JIT_ENABLED, PACKAGE, cache_folder
-
-    def compiled(module: str) -> bool:
-        folder = (PACKAGE / module).parent
-        return any(cache_folder(folder).glob(f"*/{Path(module).name}.*.nbi"))
-
-    missing = [f"colift.{name.replace('/', '.')}" for name in LONGEST if not compiled(name)]
-    if JIT_ENABLED and missing:
-        with ThreadPoolExecutor(workers) as pool:
-            commands = [[sys.executable, "-c", f"import {module}"] for module in missing]
-            list(
-                pool.map(subprocess.run, commands)
-            )  # what fails here fails in a test, with its reason
+    # What fails here fails in a test, with its reason.
+    subprocess.run([sys.executable, "-m", "colift", "compile"], stdout=subprocess.DEVNULL)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

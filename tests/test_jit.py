@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
+import subprocess
+import sys
+from contextlib import nullcontext
 from pathlib import Path
 
+import numba
 import pytest
 
 from colift.kernel import jit
+from colift.kernel.compiling import hurried
+
+needs_jit = pytest.mark.skipif(not jit.JIT_ENABLED, reason="compiled kernels only")
 
 
 @pytest.fixture(autouse=True)
@@ -51,3 +59,48 @@ def test_a_folder_that_others_can_write_to_is_not_used(
     folder = jit.cache_folder(tmp_path)
     assert folder.is_dir()
     assert taken not in folder.parents
+
+
+def mixed(values, k, flag):
+    """Operators of floats, integers, constants and booleans, over and over with the same types."""
+    total = 0.0
+    for i in range(values.shape[0] - 1):
+        total += values[i] ** 2 - values[i + 1] * k + (i % 3) * 2.0 - i // 2 + (k << 1)
+        if (total > 1.0) & flag or i == k:
+            total -= values[i] ** 3 + 2 * total
+    return total
+
+
+@needs_jit
+def test_what_is_compiled_in_a_hurry_is_the_same_machine_code() -> None:
+    found = []
+    for around in (nullcontext, hurried):
+        compiled = numba.njit(error_model="numpy")(mixed)
+        with around():
+            compiled.compile((jit.vector, jit.i8, numba.boolean))
+        (code,) = compiled.inspect_asm().values()
+        found.append(re.sub(r"B\d+v\d+B", "", code))
+    assert found[0] == found[1]
+
+
+@needs_jit
+def test_of_two_processes_one_compiles_a_kernel_and_the_other_waits_for_it(tmp_path: Path) -> None:
+    (tmp_path / "shared.py").write_text("""
+from colift.kernel.jit import f8, kernel, vector
+@kernel(f8(vector))
+def total(values):
+    found = 0.0
+    for value in values:
+        found += value
+    return found
+""")
+    program = "import shared; print(sum(shared.total.stats.cache_hits.values()))"
+    two = [
+        subprocess.Popen(
+            [sys.executable, "-c", program],
+            env=os.environ | {"COLIFT_CACHE": str(tmp_path / "cache")},
+            cwd=tmp_path, text=True, stdout=subprocess.PIPE,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    assert sorted(each.communicate(timeout=300)[0] for each in two) == ["0\n", "1\n"]

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from pages import fill, stored, table
 
 from colift.control.allocation.base import INFO_SIZE, Beside, Status, ask
-from colift.control.allocation.limits.plan import matrix_of
 from colift.control.allocation.limits.reach import farthest
 from colift.control.allocation.safe_wrench import MEMORY, PRICES, SafeWrench, outward
 from colift.kernel.jit import address_of, monotonic_ns
 from colift.team import Body, Team
+from colift.team.geometry import matrix_of
 from colift.team.load import box_inertia, usual_attachments
 
 Array = NDArray[np.float64]

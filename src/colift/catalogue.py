@@ -76,6 +76,12 @@ TRACKING = {
 }  # fmt: skip
 """The paper's cascade, in which the load's own controller brings it to its place, and the motors that it takes for granted."""
 
+RIGID = "rigid"
+"""Kind of a load of which place and attitude are wanted."""
+
+TURNING = {**FORMATION, "load_control": "pose", "allocation": "safe-wrench"}
+"""What flies a rigid load."""
+
 UNNUMBERED = ("count", "cable_length")
 """What a mission may say of its drones and leave them the paper's."""
 
@@ -98,13 +104,17 @@ def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
     named = {of: table(of).get("kind") for of in (*FORMATION, "supervision", "sensing")}
     stands = table("start").get("on_ground") is True
     asked = any(
-        named[of] not in (None, FORMATION[of]) for of in ("load_control", "position_control")
+        named[of] not in (None, FORMATION[of], TURNING[of])
+        for of in ("load_control", "position_control")
     )
-    formation = stands or any(named[of] == own for of, own in FORMATION.items())
+    turns = table("load").get("kind") == RIGID
+    formation = stands or turns or any(named[of] == own for of, own in FORMATION.items())
     drones = table("drones")
     count = drones.get("count", 4)
     papers = drones.keys() <= {*UNNUMBERED} and isinstance(count, int) and count >= 3
     tracking = asked or (papers and not formation and named["supervision"] != LEADING)
+    if turns and layer in TURNING:
+        return TURNING[layer]
     if layer in TRACKING and tracking:
         return TRACKING[layer]
     if layer == "estimation" and named["sensing"] in (None, DEFAULT_KINDS["sensing"]):

@@ -12,11 +12,12 @@ from scipy.optimize import minimize
 
 from colift.control.allocation.base import Allocator, Status
 from colift.control.allocation.limits import metres
-from colift.control.allocation.limits.plan import matrix_of, plan, wrench_map
 from colift.control.allocation.safe_wrench import SafeWrench, outward
 from colift.control.allocation.wrench_min_norm import WrenchMinNorm
 from colift.team import Body, Team
+from colift.team.geometry import matrix_of
 from colift.team.load import box_inertia, usual_attachments
+from colift.team.plan import plan, wrench_map
 
 SIZE = np.array([0.6, 0.4, 0.2])
 MASS = 0.5

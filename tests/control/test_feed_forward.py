@@ -14,18 +14,18 @@ from colift.kernel.math.sphere import follow
 
 
 @inline
-def track(start, targets, omega, dt, out):
-    memory = np.zeros(9)
-    memory[:3] = start
+def track(memory, targets, omega, dt, out):
     for k in range(targets.shape[0]):
         follow(memory, 0, targets[k, 0], targets[k, 1], targets[k, 2], omega, dt)
-        out[k] = memory
+        for j in range(9):
+            out[k, j] = memory[j]
 
 
 def filtered(start, targets, omega=10.0, dt=0.001):
     out = np.zeros((len(targets), 9))
-    unit = np.asarray(start, dtype=float) / np.linalg.norm(start)
-    track(unit, np.ascontiguousarray(targets, dtype=float), omega, dt, out)
+    memory = np.zeros(9)
+    memory[:3] = np.asarray(start, dtype=float) / np.linalg.norm(start)
+    track(memory, np.ascontiguousarray(targets, dtype=float), omega, dt, out)
     return out[:, :3], out[:, 3:6], out[:, 6:]
 
 

@@ -8,6 +8,7 @@ from colift.kernel.ports import PORTS
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, state_size
 from colift.world.plant._chain import BEAD, CABLE
+from colift.world.plant._params import P
 from colift.world.plant.base import Start
 from colift.world.plant.rigid_cables import RigidCables
 
@@ -34,7 +35,7 @@ class Rig:
         start = Start(np.zeros(3), np.zeros(3), np.asarray(directions), attitudes)
         self.memory = self.part.initial(team, start)
         self.state = self.memory[: state_size(n)]
-        self.load = self.state[:LOAD].reshape(2, 3)
+        self.load = self.state[:6].reshape(2, 3)
         self.drones = self.state[LOAD:].reshape(n, DRONE)
         k, size = getattr(self.part, "bead_count", 0), self.state.size
         self.beads = self.memory[size : size + BEAD * k * n].reshape(n, k, BEAD)
@@ -54,7 +55,8 @@ class Rig:
         """Put beads evenly between drone and load, in motion with them."""
         k = self.beads.shape[1]
         down = np.arange(1, k + 1)[:, None] / (k + 1)
-        self.beads[:] = (1.0 - down) * self.drones[:, None, :BEAD] + down * self.load.ravel()
+        ends = self.observe()["ends"].reshape(self.n, 1, BEAD)
+        self.beads[:] = (1.0 - down) * self.drones[:, None, :BEAD] + down * ends
 
     def step(self, dt=0.001, count=1):
         port = PORTS["plant"]
@@ -84,7 +86,7 @@ class Rig:
     def points(self):
         """Masses (N,), positions and velocities (N, 3) of everything that has mass."""
         masses = [self.params[:1], self.params[MASS : MASS + BODY * self.n : BODY]]
-        states = [self.state[None, :LOAD], self.drones[:, :LOAD]]
+        states = [self.state[None, :6], self.drones[:, :6]]
         if self.beads.size:
             cables = self.params[MASS + BODY * self.n :][: CABLE * self.n].reshape(self.n, CABLE)
             masses.append(np.repeat(cables[:, 3], self.beads.shape[1]))
@@ -102,7 +104,7 @@ class Rig:
         if not hasattr(self.part, "stiffness"):
             return 0.0
         nodes = [self.drones[:, None, :3], self.beads[:, :, :3]]
-        nodes = np.concatenate([*nodes, np.tile(self.load[0], (self.n, 1, 1))], axis=1)
+        nodes = np.concatenate([*nodes, self.observe()["ends"][:, :1]], axis=1)
         lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=2)
         rest = self.team.cable_lengths[:, None] / lengths.shape[1]
         stretch = np.maximum(lengths - rest, 0.0)
@@ -122,6 +124,12 @@ class Rig:
         """Of all bodies as points, about the world's origin."""
         m, x, v = self.points()
         return m @ np.cross(x, v)
+
+    def turning(self):
+        """Kinetic energy, J, and angular momentum (3,), world, of a rigid load about its centre of mass."""
+        rates = self.state[10:13]
+        momentum = self.params[P.inertia : P.inverse].reshape(3, 3) @ rates
+        return 0.5 * rates @ momentum, rotation(self.state[6:10]) @ momentum
 
     def spin_momentum(self):
         """J Omega of each drone, turned into the world frame."""

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import json
+import os
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +24,11 @@ FLIGHT = ("colift.flight.loop", "colift.control.reference.descent")
 """Modules with kernels that any flight may call."""
 STUDIES = ("colift.study.bench.timing", "colift.study.latency", "colift.study.safety")
 """Modules with kernels that only a command of this name calls."""
+LONGEST = (("allocation", "safe"), ("supervision", "lift"))
+"""Parts that take longest to compile: they come first, so that no process is left with one at the end."""
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+Step = tuple[str, ...]
+"""A module to import, or layer and kind of a part to find; either compiles what is not in the cache."""
 
 
 @dataclass(frozen=True)
@@ -72,44 +81,103 @@ def warm(
     begin, before = time.perf_counter(), len(jit.made)
     compiled: list[str] = []
     share = 0.0
+    steps, changes = _steps(mission, allocator)
+    with _helpers(steps) as (call, theirs):
 
-    def tell(kernel: str) -> None:
-        compiled.append(kernel)
-        if progress is not None:
-            progress(share, kernel)
+        def tell(kernel: str) -> None:
+            call()
+            compiled.append(kernel)
+            if progress is not None:
+                progress(share, kernel)
 
-    steps = _steps(mission, allocator)
-    with jit.told_of_compilation(tell):
-        for number, step in enumerate(steps):
-            share = number / len(steps)
-            step()
+        with jit.told_of_compilation(tell):
+            for number, step in enumerate(steps):
+                share = number / len(steps)
+                _take(step)
+            if mission is not None:
+                _load(_table(mission), changes)
+    compiled += [kernel for kernel in theirs if kernel not in compiled]
     if progress is not None:
         progress(1.0, "")
     loaded = len(jit.made) - before - len(compiled)
     return Warmed(tuple(compiled), loaded, time.perf_counter() - begin)
 
 
-def _steps(mission: Any, allocator: str | None) -> list[Callable[[], object]]:
-    """Imports, one after the other, that compile or load what is needed."""
+@contextmanager
+def _helpers(steps: Sequence[Step]) -> Iterator[tuple[Callable[[], None], list[str]]]:
+    """When the function is called for the first time, other processes begin to take the same steps, one a core.
+
+    They begin elsewhere or from the end. No two compile the same kernel at the same time
+    (:mod:`colift.kernel.jit`), so they meet where nothing is left to do. The list has, in the end, what they compiled.
+    """
+    processes: list[subprocess.Popen[str]] = []
+    theirs: list[str] = []
+
+    def call() -> None:
+        if processes or len(steps) < 2:
+            return
+        paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+        for number in range(1, CORES):
+            begin = number // 2 * 2 * len(steps) // CORES
+            order = [*steps[begin:], *steps[:begin]]
+            if number % 2:
+                order.reverse()
+            code = f"from {__name__} import help_; help_({json.dumps(order)})"
+            process = subprocess.Popen(
+                [sys.executable, "-c", code],
+                env={**os.environ, "PYTHONPATH": paths},
+                text=True,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+            )
+            processes.append(process)
+
+    try:
+        yield call, theirs
+    finally:
+        for process in processes:
+            process.terminate()
+            theirs += process.communicate()[0].split()
+
+
+def help_(steps: Sequence[Step]) -> None:
+    """Take these steps, and print the name of every kernel that has to be compiled."""
+    from colift.kernel import jit
+
+    with jit.told_of_compilation(lambda kernel: print(kernel, flush=True)):
+        for step in steps:
+            _take(step)
+
+
+def _take(step: Step) -> None:
+    if len(step) == 1:
+        importlib.import_module(*step)
+    else:
+        find(*step)
+
+
+def _steps(mission: Any, allocator: str | None) -> tuple[list[Step], dict[str, Any]]:
+    """What is to be imported, the longest first, and what changes in the mission."""
     if mission is None and allocator is not None:
-        return [partial(find, "allocation", allocator)]
+        return [("allocation", allocator)], {}
+    changes: dict[str, Any] = {}
     if mission is None:
         parts = [(layer, kind) for layer in catalogue.FOLDERS for kind in catalogue.names(layer)]
         modules = [*FLIGHT, *STUDIES]
-        last: list[Callable[[], object]] = []
     else:
-        changes = {} if allocator is None else {"allocation.kind": allocator}
-        table = _table(mission)
-        parts = (
-            [*_parts(table)] if allocator is None else [("allocation", allocator), *_parts(table)]
-        )
-        modules = [*FLIGHT]
-        last = [partial(_load, table, changes)]  # with whatever is still missing, or wrong
-    known = [partial(find, *part) for part in parts if part[1] in catalogue.names(part[0])]
-    return [*(partial(importlib.import_module, name) for name in modules), *known, *last]
+        parts, modules = [*_parts(_table(mission))], [*FLIGHT]
+        if allocator is not None:
+            parts.insert(0, ("allocation", allocator))
+            changes["allocation.kind"] = allocator
+    known = [part for part in dict.fromkeys(parts) if part[1] in catalogue.names(part[0])]
+    first = [part for part in known if part in LONGEST]
+    rest = [part for part in known if part not in LONGEST]
+    return [*first, *((name,) for name in modules), *rest], changes
 
 
 def _load(table: dict[str, Any], changes: dict[str, Any]) -> None:
+    """With whatever is still missing, or wrong."""
     from colift.mission.load import load_mission  # which imports the loop
 
     load_mission(table, changes)

@@ -29,7 +29,7 @@ from colift.part import LAYERS, Part, Vector, make
 from colift.record.ends import ends_of
 from colift.record.recording import Recording
 from colift.team import Team, contact
-from colift.team.geometry import min_norm_tensions, widest_gap, zero_yaw_quaternion
+from colift.team.geometry import matrix_of, min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.wording import numbers
 from colift.world.disturbance.base import DisturbancePart
 from colift.world.fault.base import LOAD, Change
@@ -90,6 +90,9 @@ class Flight:
         self.wires.reference.writes.reference[:] = bus.reference[:] = mission.reference.sample(
             np.zeros(1), mission.team.of(drones)
         )[0]
+        self.wires.reference.writes.reference_attitude[:] = bus.reference_attitude[:] = (
+            start.load_attitude
+        )
         bus.desired_directions[:] = start.directions
         bus.received_directions[:] = start.directions
         bus.thrusts[:] = thrusts
@@ -269,6 +272,8 @@ class Flight:
             load_velocity=old.bus.load[1],
             directions=directions,
             attitudes=np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1)),
+            load_attitude=tuple(old.bus.load_attitude.tolist()),
+            load_rates=tuple(old.bus.load_rates.tolist()),
         )
         memory = {
             layer: fresh
@@ -293,7 +298,11 @@ class Flight:
         bus.thrusts[new] = team.masses[new] * team.gravity
         if bus.reeled.any():
             self._rebind()
-        self.wires.reference.writes.reference[:] = old.circuit.wires.reference.writes.reference
+        for now, before in zip(
+            self.wires.reference.writes, old.circuit.wires.reference.writes, strict=True
+        ):
+            if now.shape == before.shape:
+                now[:] = before
 
     def recording(self, since: float = 0.0) -> Recording:
         """What has been recorded, from ``since`` (s) on; NaN for a drone that has left."""
@@ -532,7 +541,8 @@ class Flight:
     def _fresh_memory(self, drones: list[int], start: Start) -> dict[str, Vector]:
         team = self.mission.team.of(drones)
         memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
-        real = replace(team, cable_lengths=self.mission.true_bodies.cable_lengths[drones])
+        true = self.mission.true_bodies.of(drones)
+        real = replace(team, cable_lengths=true.cable_lengths, body=true.body)
         return {**memory, "plant": self.mission.plant.initial(real, start)}
 
     def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
@@ -615,7 +625,9 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
     directions = mission.start_directions()
     first = mission.reference.sample(np.zeros(1), team)[0]
     weight = [0.0, 0.0, team.load_mass * team.gravity]
-    tensions = np.maximum(min_norm_tensions(directions, weight), 0.0)
+    attitude = mission.reference.attitude(team)
+    levers = team.levers @ matrix_of(attitude).T
+    tensions = np.maximum(min_norm_tensions(directions, weight, levers), 0.0)
     thrust = team.hover_forces(tensions, directions)
     norms = np.linalg.norm(thrust, axis=1, keepdims=True)
     upward = np.array([0.0, 0.0, 1.0])
@@ -634,5 +646,6 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
         directions=directions,
         attitudes=zero_yaw_quaternion(aim),
         places=places,
+        load_attitude=tuple(attitude.tolist()),
     )
     return start, thrusts

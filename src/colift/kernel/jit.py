@@ -27,9 +27,16 @@ import numba
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import types
-from numba.core import caching, cgutils, event
+from numba.core import caching, cgutils, event, sigutils
 from numba.core.runtime import _nrt_python as _nrt  # type: ignore[attr-defined]
 from numba.extending import intrinsic, overload
+
+from colift.kernel.compiling import BodyCompiler, hurried
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 config: Any = numba.config
 F = TypeVar("F", bound=Callable[..., Any])
@@ -48,6 +55,8 @@ mask = types.boolean[::1]
 
 # `contract` lets a*b + c become one fused instruction; nothing here assumes the absence of NaN.
 _FASTMATH = {"contract"}
+PATIENCE = 120.0
+"""Longest time for which a process waits while another compiles the kernel that it needs, s."""
 
 
 def kernel(signature: Any, *, counted: bool = True) -> Callable[[F], F]:
@@ -65,20 +74,26 @@ def kernel(signature: Any, *, counted: bool = True) -> Callable[[F], F]:
             with _cache_for(function):
                 compiled._cache = _Cache(function)
             _compile(compiled, signature)
+            compiled.disable_compile()
         made.append(name_of(function))
         return cast(F, compiled)
 
     return decorate
 
 
-def _compile(kernel: Any, signature: Any) -> None:
-    """For this signature only, from the cache or into it; without a cache where it cannot be written."""
+def _compile(function: Any, signature: Any) -> Any:
+    """For this signature, from the cache or into it; without a cache where it cannot be written."""
     try:
-        kernel.compile(signature)
-    except OSError:  # such as a full disk: Numba has compiled the kernel, but could not save it
-        if not kernel.signatures:
+        with hurried():
+            return type(function).compile(function, signature)
+    except OSError:  # such as a full disk: Numba has compiled the function, but could not save it
+        found = function.overloads.get(sigutils.normalize_signature(signature)[0])
+        if found is None:
             raise
-    kernel.disable_compile()
+        return found.entry_point
+    finally:
+        if isinstance(function._cache, _Cache):
+            function._cache.let_others()
 
 
 def address_of(kernel: Any) -> Any:
@@ -126,11 +141,44 @@ class _Listener(event.Listener):
 
 def inline(function: F) -> F:
     """A helper that becomes part of the kernels that call it; its types follow from the call."""
-    # Nobody calls one from C: without that entrance a kernel takes a seventh less time to compile.
+    return _helper(function, forceinline=True)
+
+
+def aside(function: F) -> F:
+    """A helper that stays a function of its own in the kernels that call it: for what is rarely needed, or needed in many places."""
+    return _helper(function, forceinline=False)
+
+
+def _helper(function: F, *, forceinline: bool) -> F:
+    """For kernels it is compiled without an entrance and without machine code: each has its own.
+
+    Called from Python, it is compiled once more, with both, and cached as a kernel is.
+    """
     njit: Any = numba.njit
-    options = {"error_model": "numpy", "forceinline": True, "no_cfunc_wrapper": True}
-    compiled: Any = njit(fastmath=_FASTMATH, **options)(function)
+    options = {"error_model": "numpy", "fastmath": _FASTMATH, "forceinline": forceinline}
+    options |= {"no_cfunc_wrapper": True}  # nobody calls one from C
+    compiled: Any = njit(**options)(function)
+    if JIT_ENABLED:
+
+        @cache
+        def body() -> Any:
+            return njit(**options, no_cpython_wrapper=True, pipeline_class=BodyCompiler)(function)
+
+        def compile_(signature: Any) -> Any:
+            if not isinstance(compiled._cache, _Cache) and _is_ours(function):
+                with _cache_for(function):
+                    compiled._cache = _Cache(function)
+            return _compile(compiled, signature)
+
+        compiled.get_call_template = lambda args, kws: body().get_call_template(args, kws)
+        compiled.get_overload = lambda signature: body().get_overload(signature)
+        compiled.compile = compile_
     return cast(F, compiled)
+
+
+def _is_ours(function: Any) -> bool:
+    """Whether all that a function calls is among the sources that its place in the cache is named after."""
+    return Path(function.__code__.co_filename).is_relative_to(PACKAGE)
 
 
 def splice(function: F) -> F:
@@ -193,13 +241,46 @@ class _Cache(caching.FunctionCache):
     """Numba's cache, but what was compiled is loaded without all that only compiling needs."""
 
     _impl_class = _Kept
+    _turn: int | None = None
+    """A file that is locked by this process while it compiles the kernel."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         # Of the refresh that is left out, what running code needs.
         for name, address in _nrt.c_helpers.items():
             llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
         with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+            found = self._load_overload(sig, target_context)
+            if found is None and self._wait():
+                found = self._load_overload(sig, target_context)
+            return found
+
+    def _wait(self) -> bool:
+        """Take the turn to compile, and say whether another process had it, so that the kernel may be there now."""
+        if fcntl is None:
+            return False
+        place, end = (
+            f"{self._cache_path}/{self._impl.filename_base}.turn",
+            time.monotonic() + PATIENCE,
+        )
+        waited = False
+        try:
+            self._turn = os.open(place, os.O_RDWR | os.O_CREAT, 0o600)
+            while time.monotonic() < end:
+                try:
+                    fcntl.flock(self._turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    waited = True
+                    time.sleep(0.05)
+        except OSError:  # a folder that cannot be written to, or a file system without locks
+            pass
+        return waited
+
+    def let_others(self) -> None:
+        """The turn is over, if this process had it."""
+        if self._turn is not None:
+            os.close(self._turn)
+            self._turn = None
 
 
 @contextmanager

@@ -268,7 +268,7 @@ PORTS: dict[str, Port] = {
             "position_control",
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
-                "reference", "wanted_ends", "nominal_forces", "standing", "spans", "courses", "reeled",
+                *_WANTED, "wanted_ends", "nominal_forces", "standing", "spans", "courses", "reeled",
                 "found_lengths",
                 *_RECEIVED,
             ),

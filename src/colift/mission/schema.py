@@ -22,9 +22,11 @@ from pydantic import (
 
 from colift.catalogue import LAYERS
 from colift.errors import ColiftError
+from colift.team import Body, Team, vehicles
 from colift.team import Ground as GroundBelow
-from colift.team import Team, vehicles
 from colift.team.geometry import Array, ring, ring_cone
+from colift.team.load import box_inertia, flaw_of, usual_attachments
+from colift.team.plan import plan
 
 Positive = Annotated[float, Field(gt=0.0)]
 Inertia = tuple[Positive, Positive, Positive]
@@ -120,11 +122,80 @@ class World(Section):
     """The ground, at z = 0 unless its table says otherwise; or ``"none"``, which lets things fall for ever."""
 
 
-class Load(Section):
-    """The load, a point mass."""
+Edge = Annotated[float, Field(ge=0.0, le=100.0)]
+Lever = Annotated[float, Field(ge=-100.0, le=100.0)]
+Place = tuple[Lever, Lever, Lever]
+MOST_POINTS = 8
 
+
+class Load(Section):
+    """The load: a point mass, or a rigid body of which place and attitude are wanted.
+
+    A rigid load is described in its own frame, whose origin is the middle of the box around it; that middle is what is called its place.
+    """
+
+    kind: Literal["point", "rigid"] = "point"
+    """``"point"``, or ``"rigid"`` for one with an attitude."""
     mass: Annotated[float, Field(gt=0.0, le=1e5)] = 0.225
     """kg."""
+    size: tuple[Edge, Edge, Edge] | None = None
+    """Edges of a rigid load's box, m; a bar or a panel has edges of 0."""
+    inertia: Inertia | None = None
+    """Moments of inertia about the axes through the centre of mass, kg m^2; left out: those of a uniform box."""
+    products: Place = (0.0, 0.0, 0.0)
+    """Products of inertia: the entries yz, xz and xy of the inertia matrix, kg m^2."""
+    attachments: list[Place] | None = None
+    """Where the cables end, m, one for each drone; left out: on the upper face, two at the ends of the longer edge, four on the
+    corners, others around its middle."""
+    centre_of_mass: Place = (0.0, 0.0, 0.0)
+    """m."""
+    points: Annotated[list[Place], Field(min_length=1, max_length=MOST_POINTS)] | None = None
+    """With which the load touches the ground, m; left out: the corners of its box."""
+
+    def body(self, n: int) -> Body | None:
+        """The rigid load on n cables; None for a point."""
+        if self.kind == "point":
+            return None
+        assert self.size is not None
+        size = np.array(self.size)
+        attachments = usual_attachments(n, size) if self.attachments is None else self.attachments
+        return Body(
+            inertia=self.matrix(size),
+            attachments=np.array(attachments, dtype=float),
+            centre=np.array(self.centre_of_mass),
+            size=size,
+            points=None if self.points is None else np.array(self.points),  # type: ignore[arg-type]
+        )
+
+    def matrix(self, size: Array) -> Array:
+        """Inertia (3, 3), kg m^2."""
+        if self.inertia is None:
+            return box_inertia(self.mass, size)
+        yz, xz, xy = self.products
+        return np.asarray(
+            np.diag(self.inertia) + np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+        )
+
+    def problems(self) -> list[tuple[str, str, str]]:
+        """What a point does not have, what a rigid load must have, and inertias that no body has."""
+        own = sorted({*type(self).model_fields} - {"kind", "mass"})
+        if self.kind == "point":
+            given = [name for name in own if name in self.model_fields_set]
+            message = 'is of a rigid load: give load.kind = "rigid" too'
+            return [(name, "", message) for name in given if getattr(self, name) is not None]
+        if self.size is None:
+            return [("size", "", "is required of a rigid load: the edges of the box around it, m")]
+        if self.inertia is None:
+            if sum(edge > 0.0 for edge in self.size) < 2:
+                return [
+                    ("inertia", "", "is required of a load without width: no uniform box has it")
+                ]
+            if any(self.products):
+                return [("products", str(list(self.products)), "needs load.inertia beside it")]
+            return []
+        matrix = self.matrix(np.array(self.size))
+        flaw = flaw_of(matrix)
+        return [("inertia", str(list(self.inertia)), flaw)] if flaw else []
 
 
 class Drones(Section):
@@ -301,6 +372,23 @@ class Truth(Section):
     """Of ``drones.inertia``."""
     cable_length_factor: FactorPerDrone = 1.0
     """Of ``drones.cable_length``."""
+    load_inertia_factor: Factor = 1.0
+    """Of a rigid load's inertia."""
+    centre_of_mass_offset: Place = (0.0, 0.0, 0.0)
+    """Of its true centre of mass from ``load.centre_of_mass``, m."""
+    attachment_offset: Annotated[
+        Annotated[Place, Tag("all")] | Annotated[list[Place], Tag("each")], _per_drone(1)
+    ] = (0.0, 0.0, 0.0)
+    """Of the true attachments from ``load.attachments``, m."""
+
+    def body_of(self, told: Body) -> Body:
+        """The true load that controllers are told like this."""
+        return replace(
+            told,
+            inertia=told.inertia * self.load_inertia_factor,
+            centre=told.centre + np.array(self.centre_of_mass_offset),
+            attachments=told.attachments + np.array(self.attachment_offset),
+        )
 
 
 PAPER_CONE, WIDEST_START = math.radians(35.0), math.radians(65.0)
@@ -495,6 +583,7 @@ class Frame(Section):
             cable_lengths=np.array(np.broadcast_to(drones.cable_length, n), dtype=float),
             gravity=self.world.gravity,
             ground=self.ground,
+            body=self.load.body(n),
         )
 
     @property
@@ -518,6 +607,7 @@ class Frame(Section):
             masses=told.masses * truth.drone_mass_factor,
             inertias=told.inertias * np.reshape(truth.inertia_factor, (-1, 1)),
             cable_lengths=told.cable_lengths * truth.cable_length_factor,
+            body=told.body and truth.body_of(told.body),
         )
 
     def first_drones(self) -> list[int]:
@@ -541,6 +631,12 @@ class Frame(Section):
     def start_directions(self) -> Array:
         """Unit cable directions (k, 3) at t = 0 of the k drones that fly from the start."""
         drones = self.first_drones()
+        if self.start.directions is None and self.load.kind == "rigid":
+            team = self.team.of(drones)
+            apart = np.nan_to_num(2.0 * ROOM * team.radii)
+            lean = self.start.cone_deg
+            more = {} if lean is None else {"lean": math.radians(lean)}
+            return plan(team, distance=apart, **more)[0]
         if self.start.directions is None:
             heading = math.radians(self.start.heading_deg)
             return ring(len(drones), self.start_cone, heading=heading)

@@ -59,11 +59,30 @@ def pairwise_angles(directions: Array) -> Array:
     return np.asarray(np.arctan2(cross, np.sum(a * b, axis=-1)))
 
 
-def min_norm_tensions(directions: Array, force: ArrayLike) -> Array:
-    """Tensions (n,) of least norm with ``sum T_i alpha_i = -force``, N; may be negative."""
+def min_norm_tensions(directions: Array, force: ArrayLike, levers: Array | None = None) -> Array:
+    """Tensions (n,) of least norm with ``sum T_i alpha_i = -force``, N; may be negative.
+
+    With ``levers`` (n, 3), m, world, from the centre of mass to the cables' ends, also ``sum r_i x T_i alpha_i = 0``, as far as it goes.
+    """
+    wrench = np.asarray(directions.T)
     wanted = -np.asarray(force, dtype=float)
-    solution = np.linalg.lstsq(directions.T, wanted, rcond=None)[0]
+    if levers is not None and levers.any():
+        wrench = np.vstack([wrench, np.cross(levers, directions).T / np.abs(levers).max()])
+        wanted = np.append(wanted, np.zeros(3))
+    solution = np.linalg.lstsq(wrench, wanted, rcond=None)[0]
     return np.asarray(solution)
+
+
+def matrix_of(attitude: ArrayLike) -> Array:
+    """Rotation matrix (3, 3) of a unit quaternion (4,), wxyz."""
+    w, x, y, z = np.asarray(attitude, dtype=float)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def zero_yaw_quaternion(thrust_direction: Array) -> Array:

@@ -25,7 +25,6 @@ from colift.control.allocation.common import wrench
 from colift.control.allocation.limits import elastic, metres
 from colift.control.allocation.limits.cycle import LEVEL as LEAN_MOST
 from colift.control.allocation.limits.cycle import MAX_TURN
-from colift.control.allocation.limits.plan import plan
 from colift.control.allocation.limits.usual import (
     CLEAR,
     LOW,
@@ -43,6 +42,7 @@ from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
+from colift.team.plan import plan
 
 _CONVERGED = int(Status.CONVERGED)
 _ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
@@ -881,7 +881,7 @@ class SafeWrench(AllocatorPart):
         return min(0.05, 0.5 * float(ends.min()))
 
     def formation(self, team: Team, attitude: Array | None = None) -> tuple[Array, Array]:
-        """Directions (n, 3) and tensions (n,), N, of the plan in hover; see :func:`colift.control.allocation.limits.plan.plan`."""
+        """Directions (n, 3) and tensions (n,), N, of the plan in hover; see :func:`colift.team.plan.plan`."""
         most = math.radians(self.max_cone_deg)
         return plan(
             team,

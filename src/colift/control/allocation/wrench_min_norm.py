@@ -11,7 +11,6 @@ from pydantic import Field
 from colift.control.allocation.base import INFO_GAP, SIGNATURE, AllocatorPart, Status
 from colift.control.allocation.common import wrench
 from colift.control.allocation.common.share import balance, begin, effort
-from colift.control.allocation.limits.plan import plan
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
@@ -19,6 +18,7 @@ from colift.kernel.math.columns import column
 from colift.kernel.rounding import NO_TENSION, UNBALANCED
 from colift.part import Vector
 from colift.team import Team
+from colift.team.plan import plan
 
 _CONVERGED = int(Status.CONVERGED)
 _ZERO_FORCE = int(Status.ZERO_FORCE)
@@ -83,7 +83,7 @@ class WrenchMinNorm(AllocatorPart):
 
     The pseudo-inverse of the wrench map ``G`` (6 x 3n) with a hover formation as its part in the null space, after Li, Ge and Loianno,
     "RotorTM: A Flexible Simulator for Aerial Transportation and Manipulation", IEEE T-RO, 2023. The plan
-    (:func:`colift.control.allocation.limits.plan.plan`) is a ring of drones that leans with the force and turns with the wanted heading.
+    (:func:`colift.team.plan.plan`) is a ring of drones that leans with the force and turns with the wanted heading.
     No limit is kept: not of tensions, nor turns, nor distances.
 
     Two cables, or others that end in one line, make no moment about it, and those on a point load none at all; then

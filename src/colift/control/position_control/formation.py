@@ -10,7 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
-from colift.control.position_control._cable import CABLE, lead, swing
+from colift.control.position_control._cable import (
+    CABLE,
+    lead,
+    swing,
+)
+from colift.control.position_control._nominal import numbers, plan_pulls, room
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
@@ -23,7 +28,7 @@ from colift.team import Team
 PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "velocity": 1, "stiffness": 1, "band": 1, "frequency": 1,
-        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1,
+        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1, "rigid": 1,
     },
     drone={"m": 1, "L": 1, "least": 1, "most": 1, "drag": 1},
 )  # fmt: skip
@@ -86,6 +91,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     short_y = forces[n, 1] - m_L * reference[2, 1]
     short_z = forces[n, 2] - m_L * (reference[2, 2] + g)
     stands = sees.standing[n] != 0.0
+    if params[P.rigid] > 0.0:
+        own, kept = params[P.rows + P.width * n :], memory[M.rows + M.width * n :]
+        plan_pulls(
+            n, reference, sees.reference_attitude, sees.reference_rates, dt, keep_snap, own, kept
+        )  # fmt: skip
+        if math.isnan(nominal[0, 0, 0]):
+            nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
@@ -188,6 +200,8 @@ class Formation(PositionControlPart, Delays):
     """Gain of the position error over the square of that of the velocity error."""
     frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.55
     """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
+    rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 1.5
+    """The same for cables that hold a rigid load."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
     max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
@@ -213,14 +227,25 @@ class Formation(PositionControlPart, Delays):
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
 
+    def answers(self, team: Team) -> float:
+        """Natural frequency of the filter of cable directions, rad/s."""
+        band = self.bandwidths(team).velocity
+        if team.body is not None:  # attitude is fed back through them
+            return self.rigid_frequency * band
+        return min(self.frequency * band, sway(team))
+
     def params(self, team: Team) -> Vector:
         band = self.bandwidths(team).velocity
         k = self.gain * band
-        return PARAMS.pack(
+        own = PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
-            band=band, frequency=min(self.frequency * band, sway(team)), thrust_filter=self.thrust_filter / band,
+            band=band, frequency=self.answers(team), rigid=float(team.body is not None), thrust_filter=self.thrust_filter / band,
             max_swing=self.max_swing, max_push=self.max_push,
             tangent=math.tan(math.radians(self.max_tilt_deg)), total=float(team.masses.sum()),
             m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,
             most=self.settled("max_thrust", team), drag=self.settled("rotor_drag", team),
         )  # fmt: skip
+        return np.concatenate([own, numbers(team)])
+
+    def memory(self, team: Team) -> Vector:
+        return np.concatenate([super().memory(team), np.zeros(room(team))])

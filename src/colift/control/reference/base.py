@@ -14,7 +14,8 @@ SIGNATURE = PORTS["reference"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
 The four rows of ``reference`` are position, velocity, acceleration and jerk, each the time derivative of the row above, at
-``now.time``. A reference remembers nothing: its memory is empty.
+``now.time``. Who turns a rigid load writes ``reference_attitude`` and ``reference_rates`` too; else it stays level. A reference remembers
+nothing: its memory is empty.
 """
 
 
@@ -22,6 +23,24 @@ class ReferencePart(Part):
     """Base of all references: a pure function of time."""
 
     layer: ClassVar[str] = "reference"
+
+    turns: ClassVar[tuple[str, ...]] = ()
+    """Settings that turn a rigid load; at 0 they ask for nothing."""
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        found = super().check(team)
+        if team.body is None:
+            given = [name for name in self.turns if np.any(getattr(self, name))]
+            found += [(name, "turns the load, which is a point: load.kind") for name in given]
+        return found
+
+    def attitude(self, team: Team, time: float = 0.0) -> Vector:
+        """Attitude (4,) that is wanted of a rigid load at a time, wxyz."""
+        port = PORTS["reference"]
+        signals = port.signals(team.n)
+        wire = port.wire(type(self).kernel, self.params(team), np.zeros(0), signals)
+        port.invoke(wire, 0, time, 0.0)
+        return signals["reference_attitude"]
 
     def sample(self, times: Vector, team: Team | None = None) -> Vector:
         """Reference at the given times: (len(times), 4, 3)."""

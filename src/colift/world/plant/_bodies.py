@@ -8,23 +8,36 @@ so that a drone whose cable is cut or slack needs no other description than one 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.kernel.jit import inline, kernel
+from colift.kernel.jit import aside, inline, kernel
 from colift.kernel.load import ends_of
 from colift.kernel.math import quaternion
+from colift.kernel.math.small import matrix_times
 from colift.kernel.math.winch import paid_out
 from colift.part import Places, Vector
-from colift.team import Ground, Team
-from colift.team.geometry import min_norm_tensions
-from colift.world.plant._contact import ANCHORS, PARAMS, damping_ratio, feet
-from colift.world.plant._contact import BODY as BODY
-from colift.world.plant._contact import DRONE as DRONE
-from colift.world.plant._contact import LOAD as LOAD
-from colift.world.plant._contact import MASS as MASS
+from colift.team import Body, Ground, Team
+from colift.team.geometry import matrix_of, min_norm_tensions
+from colift.team.load import corners
+from colift.world.plant._contact import ANCHORS, FIRST, damping_ratio, feet
+from colift.world.plant._load import (
+    SPIN,
+    TURN,
+    end_place,
+    end_speed,
+    into_load,
+    into_world,
+    speed_at,
+    spin,
+)
+from colift.world.plant._params import BODY as BODY
+from colift.world.plant._params import CORNERS, PARAMS, P
+from colift.world.plant._params import DRONE as DRONE
+from colift.world.plant._params import LOAD as LOAD
+from colift.world.plant._params import MASS as MASS
 from colift.world.plant.base import OBSERVE_SIGNATURE, STATE, PlantPart, Start
 
 
@@ -41,6 +54,7 @@ def free_motion(n, y, thrusts, torques, external, params, dy):  # type: ignore[n
         dy[k] = y[3 + k]
         dy[3 + k] = external[n, k] / m_L
     dy[5] -= g
+    spin(y, params, dy)
     for i in range(n):
         o = LOAD + DRONE * i
         m = params[MASS + BODY * i]
@@ -88,9 +102,9 @@ def runge_kutta(stage, size, dt, begin, slope, total, y):  # type: ignore[no-unt
 
 @inline
 def normalise(n, y):  # type: ignore[no-untyped-def]
-    """Pull the quaternions back to unit norm."""
-    for i in range(n):
-        o = LOAD + DRONE * i + 6
+    """Pull the quaternions back to unit norm; the load's stands as a drone's does."""
+    for i in range(n + 1):
+        o = DRONE * i + 6
         norm = math.sqrt(
             y[o] * y[o] + y[o + 1] * y[o + 1] + y[o + 2] * y[o + 2] + y[o + 3] * y[o + 3]
         )
@@ -108,9 +122,30 @@ def unit(x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inline
-def line(y, o):  # type: ignore[no-untyped-def]
-    """Unit vector and distance to the load from the body whose state begins at ``o``."""
-    return unit(y[0] - y[o], y[1] - y[o + 1], y[2] - y[o + 2])
+def line(i, y, params):  # type: ignore[no-untyped-def]
+    """Unit vector and distance from drone i to the end of its cable on the load."""
+    o = LOAD + DRONE * i
+    x, y_, z = end_place(i, y, params)
+    return unit(x - y[o], y_ - y[o + 1], z - y[o + 2])
+
+
+@inline
+def parting_speed(i, y, params):  # type: ignore[no-untyped-def]
+    """Velocity (3) of the end of cable i on the load from its drone, m/s."""
+    o = LOAD + DRONE * i
+    x, y_, z = end_speed(i, y, params)
+    return x - y[o + 3], y_ - y[o + 4], z - y[o + 5]
+
+
+@aside
+def yielding(i, y, ax, ay, az, params):  # type: ignore[no-untyped-def]
+    """How far the end of cable i on a rigid load yields to a unit impulse along a direction, along it, 1/kg."""
+    o = MASS + BODY * i + P.rho
+    a, b, c = params[o], params[o + 1], params[o + 2]
+    u, v, w = into_load(y, ax, ay, az)
+    mx, my, mz = b * w - c * v, c * u - a * w, a * v - b * u
+    tx, ty, tz = matrix_times(P.inverse, params, (mx, my, mz))
+    return 1.0 / params[P.m_L] + mx * tx + my * ty + mz * tz
 
 
 @inline
@@ -132,10 +167,13 @@ def raise_peaks(n, T, peak_tensions):  # type: ignore[no-untyped-def]
 
 
 @inline
-def catch_impulse(i, parting, params):  # type: ignore[no-untyped-def]
-    """Impulse that stops drone ``i`` and the load, parting along the cable at this speed, when nothing else does."""
+def catch_impulse(i, y, parting, params):  # type: ignore[no-untyped-def]
+    """Impulse that stops drone ``i`` and the load's end of its cable, parting along it at this speed, when nothing else does."""
     m_L, m = params[0], params[MASS + BODY * i]
-    return parting * m * m_L / (m + m_L)
+    if params[P.rigid] == 0.0:
+        return parting * m * m_L / (m + m_L)
+    x, y_, z, _ = line(i, y, params)
+    return parting / (1.0 / m + yielding(i, y, x, y_, z, params))
 
 
 @kernel(OBSERVE_SIGNATURE, counted=False)
@@ -149,6 +187,22 @@ def observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         load[0, k] = y[k]
         load[1, k] = y[3 + k]
     ends_of(load, ends)
+    if params[P.rigid] > 0.0:
+        for i in range(positions.shape[0]):
+            place, speed = end_place(i, y, params), end_speed(i, y, params)
+            for k in range(3):
+                ends[i, 0, k] = place[k]
+                ends[i, 1, k] = speed[k]
+        o = P.centre
+        a, b, c = params[o], params[o + 1], params[o + 2]
+        middle = into_world(y, -a, -b, -c)
+        speed = speed_at(y, -a, -b, -c)
+        for k in range(3):
+            load[0, k] += middle[k]
+            load[1, k] = speed[k]
+            writes.load_rates[k] = y[SPIN + k]
+        for k in range(4):
+            writes.load_attitude[k] = y[TURN + k]
     for i in range(positions.shape[0]):
         o = LOAD + DRONE * i
         ax, ay, az, d = unit(
@@ -169,6 +223,24 @@ def observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             attitudes[i, k] = y[o + 6 + k]
 
 
+def _load_numbers(body: Body | None) -> dict[str, Any]:
+    """Parameters of the load, but for its mass."""
+    if body is None:
+        names = ("rigid", "inertia", "inverse", "centre", "corners", "corner")
+        return dict.fromkeys(names, 0.0)
+    points = body.points if len(body.points) <= CORNERS else corners(body.size)
+    corner = np.zeros((CORNERS, 3))
+    corner[: len(points)] = points - body.centre
+    return {
+        "rigid": 1.0,
+        "inertia": body.inertia.ravel(),
+        "inverse": np.linalg.inv(body.inertia).ravel(),
+        "centre": body.centre,
+        "corners": float(len(points)),
+        "corner": corner.ravel(),
+    }
+
+
 class BodiesPart(PlantPart):
     """Base of the plants whose memory begins with the state of load and drones."""
 
@@ -182,7 +254,8 @@ class BodiesPart(PlantPart):
         return PARAMS.pack(
             team.n, m_L=team.load_mass, g=team.gravity, ground=float(team.ground is not None),
             height=ground.height, friction=ground.friction, damping=damping_ratio(ground.restitution),
-            m=team.masses, L=team.cable_lengths, J=team.inertias, foot=feet(team),
+            m=team.masses, L=team.cable_lengths, J=team.inertias, foot=feet(team), rho=team.levers,
+            **_load_numbers(team.body),
         )  # fmt: skip
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -193,12 +266,19 @@ class BodiesPart(PlantPart):
         """Memory at the start, with the cables as long as the tensions that hold the load make them."""
         memory = self.memory(team)
         weight = [0.0, 0.0, team.load_mass * team.gravity]
-        tensions = np.maximum(min_norm_tensions(start.directions, weight), 0.0)
+        turned = matrix_of(start.load_attitude)
+        levers = team.levers @ turned.T
+        tensions = np.maximum(min_norm_tensions(start.directions, weight, levers), 0.0)
         spans = self.stretched(team, tensions)[:, None] * start.directions
-        memory[0:3] = start.load_position
-        memory[3:LOAD] = start.load_velocity
+        load = STATE.view(memory[:LOAD], "load_position")
+        load[:] = start.load_position
+        if team.body is not None:
+            load += turned @ team.body.centre
+        memory[3:6] = start.load_velocity
+        memory[TURN:SPIN] = start.load_attitude
+        memory[SPIN:LOAD] = start.load_rates
         drones = memory[LOAD : state_size(team.n)].reshape(team.n, DRONE)
-        drones[:, 0:3] = start.load_position - spans if start.places is None else start.places
+        drones[:, 0:3] = load + levers - spans if start.places is None else start.places
         drones[:, 3:6] = start.load_velocity
         drones[:, 6:10] = start.attitudes
         self._let_go(memory, team.n)
@@ -208,12 +288,14 @@ class BodiesPart(PlantPart):
         """Put the anchors below the bodies."""
         if self.anchored:
             drones = memory[LOAD : state_size(n)].reshape(n, DRONE)
-            memory[-ANCHORS.size(n) :] = [*memory[:2], *drones[:, :2].ravel()]
+            anchors = memory[-ANCHORS.size(n) :]
+            anchors[:FIRST] = np.tile(memory[:2], CORNERS)
+            anchors[FIRST:] = drones[:, :2].ravel()
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         # A new drone joins the load where it is by now, not where it was when last observed.
         joining = fresh[LOAD : state_size(places.size)].reshape(places.size, DRONE)
-        joining[:, :LOAD] += old[:LOAD] - fresh[:LOAD]
+        joining[:, :6] += old[:6] - fresh[:6]
         fresh = STATE.carry_over(old, fresh, places)
         self._let_go(fresh, places.size)
         return fresh

@@ -27,6 +27,7 @@ from colift.kernel.math.columns import column
 from colift.kernel.math.winch import turning
 from colift.part import Places, Vector
 from colift.team import Team
+from colift.team.geometry import matrix_of
 from colift.world.plant._bodies import (
     BODY,
     DRONE,
@@ -38,13 +39,14 @@ from colift.world.plant._bodies import (
     free_motion,
     line,
     normalise,
+    parting_speed,
     raise_peaks,
     runge_kutta,
     state_size,
     wind,
+    yielding,
 )
 from colift.world.plant._contact import (
-    P,
     anchors_of,
     contact_size,
     press,
@@ -54,6 +56,8 @@ from colift.world.plant._contact import (
     spare_of,
     touch,
 )
+from colift.world.plant._load import end_place, end_speed, push_end
+from colift.world.plant._params import P
 from colift.world.plant.base import STEP_SIGNATURE, Start
 
 BEAD = 6
@@ -74,15 +78,19 @@ SHORTEST = 1e-6
 
 
 @inline
-def segment(y, a, b):  # type: ignore[no-untyped-def]
-    """Unit vector from node a to node b, their distance, and its rate."""
-    x, y_, z = y[b] - y[a], y[b + 1] - y[a + 1], y[b + 2] - y[a + 2]
+def segment(y, a, b, i, params):  # type: ignore[no-untyped-def]
+    """Unit vector from node a to node b, their distance, and its rate; node 0 is the end of cable i on the load."""
+    px, py, pz, vx, vy, vz = y[b], y[b + 1], y[b + 2], y[b + 3], y[b + 4], y[b + 5]
+    if b == 0:
+        px, py, pz = end_place(i, y, params)
+        vx, vy, vz = end_speed(i, y, params)
+    x, y_, z = px - y[a], py - y[a + 1], pz - y[a + 2]
     d = math.sqrt(x * x + y_ * y_ + z * z)
     scale = 1.0 / max(d, 1e-12)
     x *= scale
     y_ *= scale
     z *= scale
-    rate = x * (y[b + 3] - y[a + 3]) + y_ * (y[b + 4] - y[a + 4]) + z * (y[b + 5] - y[a + 5])
+    rate = x * (vx - y[a + 3]) + y_ * (vy - y[a + 4]) + z * (vz - y[a + 5])
     return x, y_, z, d, rate
 
 
@@ -120,7 +128,7 @@ def derivative(  # type: ignore[no-untyped-def]
     Cables have these ``lengths``, which grow at ``rates``: what is wound up stretches no more.
     """
     free_motion(n, y, thrusts, torques, external, params, dy)
-    grounded = params[P.ground] > 0.0
+    grounded, rigid = params[P.ground] > 0.0, params[P.rigid] > 0.0
     if grounded:
         touch(n, y, anchors, w, params, forces, dy)
     beads, cables = LOAD + DRONE * n, MASS + BODY * n
@@ -148,7 +156,7 @@ def derivative(  # type: ignore[no-untyped-def]
             a = LOAD + DRONE * i
             for j in range(k + 1):
                 b = beads + BEAD * (k * i + j) if j < k else 0
-                x, y_, z, d, rate = segment(y, a, b)
+                x, y_, z, d, rate = segment(y, a, b, i, params)
                 total += rate - growth
                 least = min(least, d - length)
                 if j > 0:
@@ -156,7 +164,10 @@ def derivative(  # type: ignore[no-untyped-def]
                 px, py, pz = x, y_, z
                 a = b
             if least > 0.0:
-                mobility = 1.0 / params[MASS + BODY * i] + bend / bead_mass + 1.0 / params[0]
+                yields = 1.0 / params[0]
+                if rigid:
+                    yields = yielding(i, y, px, py, pz, params)
+                mobility = 1.0 / params[MASS + BODY * i] + bend / bead_mass + yields
                 together = min(together, MILD * (k + 1) / (longest * mobility))
                 common = max(together * total / (k + 1), -stiffness * least)
         a, mass_a = LOAD + DRONE * i, params[MASS + BODY * i]
@@ -164,7 +175,7 @@ def derivative(  # type: ignore[no-untyped-def]
             b, mass_b = beads + BEAD * (k * i + j), bead_mass
             if j == k:
                 b, mass_b = 0, params[0]
-            x, y_, z, d, rate = segment(y, a, b)
+            x, y_, z, d, rate = segment(y, a, b, i, params)
             if d > length:
                 pull = max(0.0, stiffness * (d - length) + damping * (rate - growth) + common)
                 fx, fy, fz = pull * x, pull * y_, pull * z
@@ -176,12 +187,17 @@ def derivative(  # type: ignore[no-untyped-def]
                 dy[b + 5] -= fz / mass_b
                 if j == k:
                     T[i] = pull
+                    if rigid:
+                        push_end(i, -fx, -fy, -fz, y, params, dy)
             if (
                 drag > 0.0
             ):  # across the segment, by the air's speed past its middle; half to each end
-                vx = params[wind] - 0.5 * (y[a + 3] + y[b + 3])
-                vy = params[wind + 1] - 0.5 * (y[a + 4] + y[b + 4])
-                vz = params[wind + 2] - 0.5 * (y[a + 5] + y[b + 5])
+                far = (y[b + 3], y[b + 4], y[b + 5])
+                if j == k:
+                    far = end_speed(i, y, params)
+                vx = params[wind] - 0.5 * (y[a + 3] + far[0])
+                vy = params[wind + 1] - 0.5 * (y[a + 4] + far[1])
+                vz = params[wind + 2] - 0.5 * (y[a + 5] + far[2])
                 along = vx * x + vy * y_ + vz * z
                 vx -= along * x
                 vy -= along * y_
@@ -193,6 +209,8 @@ def derivative(  # type: ignore[no-untyped-def]
                 dy[b + 3] += half * vx / mass_b
                 dy[b + 4] += half * vy / mass_b
                 dy[b + 5] += half * vz / mass_b
+                if rigid and j == k:
+                    push_end(i, half * vx, half * vy, half * vz, y, params, dy)
             a, mass_a = b, mass_b
 
 
@@ -205,17 +223,16 @@ def note_catches(n, y, attached, T, params, lengths, rates, parting, catch_impul
     for i in range(n):
         if parting[i] < 0.0 and T[i] > 0.0:
             continue
-        o = LOAD + DRONE * i
-        x, y_, z, d = line(y, o)
+        x, y_, z, d = line(i, y, params)
         if attached[i] == 0.0:
             parting[i] = 0.0
         elif d > lengths[i]:
             if parting[i] > 0.0:
-                catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, parting[i], params))
+                catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, y, parting[i], params))
             parting[i] = -1.0
         else:
-            along = x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5])
-            along -= rates[i]
+            vx, vy, vz = parting_speed(i, y, params)
+            along = x * vx + y_ * vy + z * vz - rates[i]
             free = T[i] == 0.0 or along <= 0.0
             parting[i] = max(along, 0.0 if free else parting[i])
 
@@ -338,19 +355,17 @@ class ChainPart(BodiesPart):
             team,
             load_mass=team.load_mass + 0.5 * float(share.sum()),
             masses=team.masses + 0.5 * share,
+            body=team.body and team.body.with_masses(team.load_mass, 0.5 * share),
         )
         stiffness = self.stiffness * (k + 1) / team.cable_lengths
-        bounce = np.sqrt(
-            self.stiffness / team.cable_lengths * (1.0 / team.masses + 1.0 / team.load_mass)
-        )
+        yields = _yields(team)
+        bounce = np.sqrt(self.stiffness / team.cable_lengths * (1.0 / team.masses + yields))
         delay = 2.0 * self.damping_ratio / bounce
         # Gershgorin: squared rate of a segment's mode, by the segments that share its two ends.
-        ends = np.array([n / loaded.load_mass + 1.0 / loaded.masses])
+        ends = np.array([n * _yields(loaded) + 1.0 / loaded.masses])
         if k:
             beads = 2.0 / share
-            ends = np.array(
-                [1.0 / loaded.masses + beads, 2.0 * beads, beads + n / loaded.load_mass]
-            )
+            ends = np.array([1.0 / loaded.masses + beads, 2.0 * beads, beads + n * _yields(loaded)])
         fastest = np.sqrt((stiffness * ends).max(axis=0))
         own = np.minimum(delay, 1.0 / fastest)
         cables = CABLES.pack(
@@ -373,23 +388,27 @@ class ChainPart(BodiesPart):
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
         """Straight cables, as long as the tensions that hold the load make them; slack ones lie in a level arc."""
+        team = replace(team, body=self._cables(team)[0].body)
         memory = super().initial(team, start)
         k, first = self.bead_count, state_size(team.n)
         drones = memory[LOAD:first].reshape(team.n, 1, DRONE)
+        levers = team.levers @ matrix_of(start.load_attitude).T
         beads = memory[first : first + BEAD * k * team.n].reshape(team.n, k, BEAD)
         if start.places is None:
             down = np.arange(1, k + 1)[:, None] / (k + 1)
-            beads[:] = (1.0 - down) * drones[:, :, :BEAD] + down * memory[:LOAD]
+            ends = np.tile(memory[:BEAD], (team.n, 1, 1))
+            ends[:, 0, :3] += levers
+            beads[:] = (1.0 - down) * drones[:, :, :BEAD] + down * ends
         else:
-            ends = zip(start.places, team.cable_lengths, strict=True)
-            beads[:, :, :3] = [level_arc(a, start.load_position, length, k) for a, length in ends]
+            cables = zip(start.places, memory[:3] + levers, team.cable_lengths, strict=True)
+            beads[:, :, :3] = [level_arc(a, b, length, k) for a, b, length in cables]
         return memory
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         width = BEAD * self.bead_count
         now, before = state_size(places.size), state_size(_team_size(old, width))
         beads = fresh[now : now + width * places.size].reshape(-1, BEAD)
-        beads += old[:LOAD] - fresh[:LOAD]
+        beads += old[:BEAD] - fresh[:BEAD]
         for new, place in enumerate(places):
             if place >= 0:
                 begin = before + width * place
@@ -408,6 +427,14 @@ class ChainPart(BodiesPart):
                 f"is the least; with the other settings at most {allowed:.2g} N",
             )
         ]
+
+
+def _yields(team: Team) -> NDArray[np.float64]:
+    """How far the load's end of each cable yields to a unit impulse (n,), at most, 1/kg."""
+    if team.body is None:
+        return np.full(team.n, 1.0 / team.load_mass)
+    least = float(np.linalg.eigvalsh(team.body.inertia)[0])
+    return np.asarray(1.0 / team.load_mass + np.sum(team.levers**2, axis=1) / least)
 
 
 def _team_size(memory: Vector, width: int) -> int:

@@ -10,7 +10,7 @@ A body of mass ``m`` whose lowest point is ``d`` below the surface, with the spe
 bounded by what the spring presses, not by ``N``, in which the damper would lend the anchor a stretch that nobody has paid
 for; and by twice what weight alone presses, or a hard landing would wind it up and throw the body back along the ground. At rest a body sinks in by ``g / w^2``, on every mass alike, and slides with ``mu m g``.
 
-The load touches with its point, a drone with four feet in the plane of its centre, each for a quarter of its mass: so a
+A load touches with its point, a rigid one with its corners, each for a quarter of its mass; a drone with four feet in the plane of its centre, each for a quarter of its mass: so a
 drone that comes down aslant is levelled, and the energy of that comes from its weight. The feet stand no farther out than
 where the drone rocks at the rate ``w`` too.
 
@@ -24,10 +24,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.kernel.jit import inline, splice
+from colift.kernel.jit import aside, inline, splice
 from colift.kernel.layout import Layout
 from colift.team import Team
-from colift.world.plant.base import STATE
+from colift.world.plant._load import into_load, into_world, speed_at, twist
+from colift.world.plant._params import BODY, CORNERS, DRONE, LOAD, MASS, P
 
 RATE = 300.0
 """The rate ``w`` of contact, 1/s: a body at rest sinks in by 0.11 mm."""
@@ -37,20 +38,9 @@ HELD = 2.0
 """Depths of standing up to which pressing lets the anchor stretch."""
 FEET = 4
 
-LOAD: int = STATE.at.rows
-DRONE: int = STATE.at.width
-PARAMS = Layout(
-    team={"m_L": 1, "g": 1, "ground": 1, "height": 1, "friction": 1, "damping": 1},
-    drone={"m": 1, "L": 1, "J": 3, "foot": 1},
-)
-"""How the parameters of the plants that colift brings begin; ``ground`` is 1 where there is one."""
-P = PARAMS.at
-MASS: int = P.rows
-BODY: int = P.width
-"""Where the first drone's numbers stand in the parameters, and how many each has."""
-
-ANCHORS = Layout(team={"load": 2}, drone={"drone": 2})
-"""At the end of a plant's memory: where friction holds load and drones, world x and y."""
+ANCHORS = Layout(team={"load": 2 * CORNERS}, drone={"drone": 2})
+"""At the end of a plant's memory: where friction holds the corners of the load, or its one point, and the drones, world x and y."""
+FIRST: int = ANCHORS.at.rows
 SPARE = Layout(team={"load": 3}, drone={"drone": 3})
 """Before them, forces that nobody asks for."""
 
@@ -58,13 +48,13 @@ SPARE = Layout(team={"load": 3}, drone={"drone": 3})
 @splice
 def anchors_of(memory, n):  # type: ignore[no-untyped-def]
     """The anchors in a plant's memory."""
-    return memory[memory.shape[0] - 2 * (n + 1) :]
+    return memory[memory.shape[0] - FIRST - 2 * n :]
 
 
 @splice
 def spare_of(memory, n):  # type: ignore[no-untyped-def]
     """Room for forces (n + 1, 3) in a plant's memory."""
-    end = memory.shape[0] - 2 * (n + 1)
+    end = memory.shape[0] - FIRST - 2 * n
     return memory[end - 3 * (n + 1) : end].reshape(n + 1, 3)
 
 
@@ -132,21 +122,53 @@ def up(y, o):  # type: ignore[no-untyped-def]
     return 2.0 * (x * z - w * y_), 2.0 * (y_ * z + w * x), w * w - x * x - y_ * y_ + z * z
 
 
+@aside
+def touch_corners(y, anchors, w, params, dy):  # type: ignore[no-untyped-def]
+    """Add to the derivative of a rigid load's motion what the ground does to its corners; the force, N, world."""
+    height, friction, zeta = params[P.height], params[P.friction], params[P.damping]
+    count = int(params[P.corners])
+    m = params[P.m_L] / min(count, FEET)
+    fx = fy = fz = 0.0
+    for k in range(count):
+        o = P.corner + 3 * k
+        a, b, c = params[o], params[o + 1], params[o + 2]
+        dx, dy_, dz = into_world(y, a, b, c)
+        depth = height - y[2] - dz
+        if depth <= 0.0:
+            continue
+        u, v, rising = speed_at(y, a, b, c)
+        N = press(m, depth, -rising, w, zeta)
+        if N > 0.0:
+            x, y_ = y[0] + dx - anchors[2 * k], y[1] + dy_ - anchors[2 * k + 1]
+            rx, ry = rub(m, x, y_, u, v, w, friction * N)
+            fx, fy, fz = fx + rx, fy + ry, fz + N
+            p, q, r = into_load(y, rx, ry, N)
+            twist(b * r - c * q, c * p - a * r, a * q - b * p, params, dy)
+    if fz > 0.0:
+        dy[3] += fx / params[P.m_L]
+        dy[4] += fy / params[P.m_L]
+        dy[5] += fz / params[P.m_L]
+    return fx, fy, fz
+
+
 @inline
 def touch(n, y, anchors, w, params, forces, dy):  # type: ignore[no-untyped-def]
     """Add to the derivative of the state what the ground does; ``forces`` (n + 1, 3) on drones and, last, load, N."""
     height, friction, zeta = params[P.height], params[P.friction], params[P.damping]
-    fx = fy = 0.0
+    fx = fy = N = 0.0
     m_L = params[P.m_L]
-    N = press(m_L, height - y[2], -y[5], w, zeta)
-    if N > 0.0:
+    if params[P.rigid] > 0.0:
+        fx, fy, N = touch_corners(y, anchors, w, params, dy)
+    else:
+        N = press(m_L, height - y[2], -y[5], w, zeta)
+    if N > 0.0 and params[P.rigid] == 0.0:
         fx, fy = rub(m_L, y[0] - anchors[0], y[1] - anchors[1], y[3], y[4], w, friction * N)
         dy[3] += fx / m_L
         dy[4] += fy / m_L
         dy[5] += N / m_L
     forces[n, 0], forces[n, 1], forces[n, 2] = fx, fy, N
     for i in range(n):
-        o, a, b = LOAD + DRONE * i, 2 * (i + 1), MASS + BODY * i
+        o, a, b = LOAD + DRONE * i, FIRST + 2 * i, MASS + BODY * i
         m, r = params[b + P.m], params[b + P.foot]
         fx = fy = fz = 0.0
         d = height - y[o + 2]
@@ -191,13 +213,29 @@ def depth(i, y, params):  # type: ignore[no-untyped-def]
 
 
 @inline
-def hold(y, o, anchors, a, reach):  # type: ignore[no-untyped-def]
-    """Bring the anchor ``a`` of the body at ``o`` within this reach of it, m."""
-    x, y_ = anchors[a] - y[o], anchors[a + 1] - y[o + 1]
-    size = math.sqrt(x * x + y_ * y_)
+def hold(px, py, anchors, a, reach):  # type: ignore[no-untyped-def]
+    """Bring the anchor ``a`` within this reach (m) of the place ``(px, py)`` that it holds."""
+    x, y = anchors[a] - px, anchors[a + 1] - py
+    size = math.sqrt(x * x + y * y)
     if size > reach:
-        anchors[a] = y[o] + x * (reach / size)
-        anchors[a + 1] = y[o + 1] + y_ * (reach / size)
+        anchors[a] = px + x * (reach / size)
+        anchors[a + 1] = py + y * (reach / size)
+
+
+@aside
+def settle_corners(begin, y, most, params, anchors):  # type: ignore[no-untyped-def]
+    """Let the anchors of a rigid load's corners follow; the largest speed (m/s) with which one came down, 0 where none did."""
+    height, friction = params[P.height], params[P.friction]
+    fastest = 0.0
+    for k in range(int(params[P.corners])):
+        o = P.corner + 3 * k
+        a, b, c = params[o], params[o + 1], params[o + 2]
+        dx, dy, dz = into_world(y, a, b, c)
+        d = max(0.0, height - y[2] - dz)
+        hold(y[0] + dx, y[1] + dy, anchors, 2 * k, friction * min(d, most))
+        if d > 0.0 and begin[2] + into_world(begin, a, b, c)[2] >= height:
+            fastest = max(fastest, -speed_at(begin, a, b, c)[2])
+    return fastest
 
 
 @inline
@@ -205,13 +243,16 @@ def settle(n, begin, y, w, params, anchors, touch_speeds):  # type: ignore[no-un
     """After a substep that began at ``begin``: anchors follow; keep the speed (m/s) of each body that came down in it."""
     height, friction = params[P.height], params[P.friction]
     most = HELD * params[P.g] / (w * w)
-    d = max(0.0, height - y[2])
-    hold(y, 0, anchors, 0, friction * min(d, most))
-    if d > 0.0 and begin[2] >= height:
-        touch_speeds[n] = max(touch_speeds[n], -begin[5])
+    if params[P.rigid] > 0.0:
+        touch_speeds[n] = max(touch_speeds[n], settle_corners(begin, y, most, params, anchors))
+    else:
+        d = max(0.0, height - y[2])
+        hold(y[0], y[1], anchors, 0, friction * min(d, most))
+        if d > 0.0 and begin[2] >= height:
+            touch_speeds[n] = max(touch_speeds[n], -begin[5])
     for i in range(n):
         o = LOAD + DRONE * i
         d = depth(i, y, params)
-        hold(y, o, anchors, 2 * (i + 1), friction * min(d, most))
+        hold(y[o], y[o + 1], anchors, FIRST + 2 * i, friction * min(d, most))
         if d > 0.0 and depth(i, begin, params) == 0.0:
             touch_speeds[i] = max(touch_speeds[i], -begin[o + 5])

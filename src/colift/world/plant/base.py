@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from colift.kernel.layout import Layout
 from colift.kernel.ports import PORTS
+from colift.kernel.signals import LEVEL
 from colift.part import Part
 from colift.team import Team
 
@@ -38,10 +39,10 @@ what stops drone and load, were nothing else to hold them.
 
 
 STATE = Layout(
-    team={"load_position": 3, "load_velocity": 3},
+    team={"load_position": 3, "load_velocity": 3, "load_attitude": 4, "load_rates": 3},
     drone={"position": 3, "velocity": 3, "attitude": 4, "rates": 3},
 )
-"""How the memory of the plants that colift brings begins: the state of load and drones."""
+"""How the memory of the plants that colift brings begins: the state of load and drones. The load's is that of its centre of mass."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +50,14 @@ class Start:
     """State at t = 0; shapes as in :data:`OBSERVE_SIGNATURE`, everything else at rest."""
 
     load_position: NDArray[np.float64]
+    """Of a rigid load its middle."""
     load_velocity: NDArray[np.float64]
     directions: NDArray[np.float64]
     attitudes: NDArray[np.float64]
+    load_attitude: tuple[float, ...] = LEVEL
+    """Of a rigid load, wxyz."""
+    load_rates: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """rad/s."""
     places: NDArray[np.float64] | None = None
     """Of the drones (n, 3), world, m, where their cables may be slack; None where they are taut along the ``directions``."""
 

@@ -22,6 +22,7 @@ from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
 from colift.world.plant._contact import RATE
+from colift.world.plant._params import P
 
 SETTINGS = 4
 """Parameters after those of the bodies: time constant, damping ratio, impedance, substeps."""
@@ -31,6 +32,8 @@ FINER = 20
 """Steps in place of one while a winch turns: a tendon's limit stands still within each, and would pull in jerks."""
 GRAIN = 1e-3
 """Radius of what touches the ground, m; the plane lies as much lower."""
+PLACES, SPEEDS = np.array([0, 1, 2, 6, 7, 8, 9]), np.array([3, 4, 5, 10, 11, 12])
+"""Where what MuJoCo calls a body's position and velocity stand in its state."""
 FEET = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
 
@@ -48,7 +51,7 @@ def _text(*numbers: float) -> str:
 
 def model_xml(params: Vector) -> str:
     """MJCF of load, drones and cables."""
-    load_mass, gravity, grounded, height, friction, damping = params[:MASS]
+    load_mass, gravity, grounded, height, friction, damping, rigid = params[: P.inertia]
     bodies = params[MASS:-SETTINGS].reshape(-1, BODY)
     time_constant, damping_ratio, impedance = params[-SETTINGS:-1]
     limit = (
@@ -63,24 +66,31 @@ def model_xml(params: Vector) -> str:
         )
         grain = f'<geom size="{_text(GRAIN)}" mass="0" conaffinity="0" {contact} pos="'
         plane = f'<geom type="plane" size="1 1 1" pos="0 0 {_text(height - GRAIN)}" contype="0" {contact}/>'
-    drones, cables, motors = [], [], []
-    for i, (mass, length, *inertia, foot) in enumerate(bodies):
+    drones, cables, motors, ends = [], [], [], []
+    for i, (mass, length, jx, jy, jz, foot, *end) in enumerate(bodies):
         feet = [f'{grain}{_text(x * foot, y * foot, 0.0)}"/>' for x, y in FEET if grain]
         drones.append(
             f'<body pos="0 0 {_text(length)}"><freejoint/><inertial pos="0 0 0" mass="{_text(mass)}" '
-            f'diaginertia="{_text(*inertia)}"/>{"".join(feet)}<site name="{i}"/></body>'
+            f'diaginertia="{_text(jx, jy, jz)}"/>{"".join(feet)}<site name="{i}"/></body>'
         )
         cables.append(
             f'<spatial {limit} range="0 {_text(length)}"><site site="{i}"/>'
-            '<site site="load"/></spatial>'
+            f'<site site="end{i}"/></spatial>'
         )
+        ends.append(f'<site name="end{i}" pos="{_text(*end)}"/>')
         motors += [f'<motor site="{i}" gear="{_text(*row)}"/>' for row in np.eye(6)[[2, 3, 4, 5]]]
-    slides = "".join(f'<joint type="slide" axis="{_text(*axis)}"/>' for axis in np.eye(3))
-    load = f'{grain}0 0 0"/>' if grain else ""
+    load = "".join(f'<joint type="slide" axis="{_text(*axis)}"/>' for axis in np.eye(3))
+    touching, inertia = np.zeros((1, 3)), "1 1 1 0 0 0"
+    if rigid:
+        load, (xx, xy, xz, _, yy, yz, _, _, zz) = "<freejoint/>", params[P.inertia : P.inverse]
+        touching = params[P.corner : MASS].reshape(-1, 3)[: int(params[P.corners])]
+        inertia = _text(xx, yy, zz, xy, xz, yz)
+    if grain:
+        ends += [f'{grain}{_text(*point)}"/>' for point in touching]
     return f"""<mujoco><option integrator="RK4" gravity="0 0 {_text(-gravity)}">
 <flag autoreset="disable"/></option>
-<worldbody>{plane}<body>{slides}<inertial pos="0 0 0" mass="{_text(load_mass)}" diaginertia="1 1 1"/>
-{load}<site name="load"/></body>{"".join(drones)}</worldbody>
+<worldbody>{plane}<body>{load}<inertial pos="0 0 0" mass="{_text(load_mass)}" fullinertia="{inertia}"/>
+{"".join(ends)}</body>{"".join(drones)}</worldbody>
 <tendon>{"".join(cables)}</tendon><actuator>{"".join(motors)}</actuator></mujoco>"""
 
 
@@ -91,11 +101,12 @@ def _scene(params: bytes) -> _Scene:
 
     model = mujoco.MjModel.from_xml_string(model_xml(np.frombuffer(params)))
     drones = LOAD + DRONE * np.arange(model.ntendon)[:, None]
+    rigid = model.nq > 3 + 7 * model.ntendon
     return _Scene(
         model=model,
         data=mujoco.MjData(model),
-        qpos=np.append(np.arange(3), drones + np.array([0, 1, 2, 6, 7, 8, 9])),
-        qvel=np.append(np.arange(3, LOAD), drones + np.array([3, 4, 5, 10, 11, 12])),
+        qpos=np.append(PLACES if rigid else PLACES[:3], drones + PLACES),
+        qvel=np.append(SPEEDS if rigid else SPEEDS[:3], drones + SPEEDS),
         body=model.geom_bodyid - 2,
     )
 
@@ -110,7 +121,8 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 
     scene = _scene(params.tobytes())
     model, data, n = scene.model, scene.data, thrusts.shape[0]
-    state, warm_start, parting = np.split(memory, [state_size(n), memory.size - n])
+    state, rest, parting = np.split(memory, [state_size(n), memory.size - n])
+    warm_start = rest[: model.nv]
     if not all(np.abs(a).max() < mujoco.mjMAXVAL for a in (thrusts, torques, external, state)):
         state[:] = np.nan  # MuJoCo would go on with other numbers; a flight that diverges shall end
         return
@@ -147,7 +159,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         holds, taut = attached > 0.0, data.ten_length > lengths + wound[:, 0]
         np.maximum(catch_impulses, reduced * parting, out=catch_impulses, where=holds & taut)
         parting[:] = np.where(holds & ~taut, np.maximum(data.ten_velocity - wound[:, 1], 0.0), 0.0)
-        sinking = -np.append(data.qvel[5::6], data.qvel[2])
+        sinking = -np.append(data.qvel[-6 * n :][2::6], data.qvel[2])
         model.tendon_range[:, 1] = lengths + np.array(middle) @ _ahead(params)
         mujoco.mj_step(model, data)
         if model.ngeom:
@@ -224,4 +236,4 @@ class Mujoco(BodiesPart):
         return np.append(super().params(team), settings)
 
     def memory(self, team: Team) -> Vector:
-        return np.zeros(state_size(team.n) + 3 + 7 * team.n)
+        return np.zeros(state_size(team.n) + 6 + 7 * team.n)

@@ -24,7 +24,8 @@ from colift.world.plant._bodies import (
     state_size,
     wind,
 )
-from colift.world.plant._contact import P, anchors_of, contact_size, rate, settle, spare_of
+from colift.world.plant._contact import anchors_of, contact_size, rate, settle, spare_of
+from colift.world.plant._params import P
 from colift.world.plant._rigid import derivative, project
 from colift.world.plant.base import STEP_SIGNATURE
 

@@ -30,13 +30,13 @@ from colift.world.plant._bodies import (
     catch_impulse,
     free_motion,
     line,
+    parting_speed,
     raise_peaks,
     runge_kutta,
     state_size,
     wind,
 )
 from colift.world.plant._contact import (
-    P,
     anchors_of,
     contact_size,
     rate,
@@ -44,11 +44,14 @@ from colift.world.plant._contact import (
     spare_of,
     touch,
 )
+from colift.world.plant._params import P
 from colift.world.plant._rigid import (
     closing,
     demand,
     derivative,
+    lever,
     lines,
+    moment_of,
     project,
     pull,
     solve,
@@ -76,7 +79,7 @@ S, SPANS = SCRATCH.at, SCRATCH.spans
 
 
 @inline
-def complementarity(n, alpha, b, taut, params, held, T):  # type: ignore[no-untyped-def]
+def complementarity(n, y, alpha, b, taut, params, held, T):  # type: ignore[no-untyped-def]
     """Pulls ``T >= 0`` of the taut cables that leave no demand, with equality where a cable pulls.
 
     Exchanges the first offender until there is none (Murty 1974), which ends as the matrix is positive definite; mostly
@@ -89,7 +92,10 @@ def complementarity(n, alpha, b, taut, params, held, T):  # type: ignore[no-unty
             largest = max(largest, abs(b[i]))
     tolerance = 1e-12 * largest
     for _ in range(10 * n + 10):
-        solve(n, alpha, b, held, params, T)
+        solve(n, y, alpha, b, held, params, T)
+        ax = ay = az = 0.0
+        if params[P.rigid] > 0.0:
+            ax, ay, az = moment_of(n, y, alpha, T, params)
         px = py = pz = 0.0
         for i in range(n):
             px += T[i] * alpha[3 * i]
@@ -101,7 +107,11 @@ def complementarity(n, alpha, b, taut, params, held, T):  # type: ignore[no-unty
                 wrong = T[i] < -tolerance * params[MASS + BODY * i]
             else:
                 along = alpha[3 * i] * px + alpha[3 * i + 1] * py + alpha[3 * i + 2] * pz
-                wrong = taut[i] > 0.0 and b[i] - along / params[0] > tolerance
+                yields = along / params[P.m_L]
+                if params[P.rigid] > 0.0:
+                    _, _, _, p, q, r = lever(i, y, alpha, params)
+                    yields += p * ax + q * ay + r * az
+                wrong = taut[i] > 0.0 and b[i] - yields > tolerance
             if wrong:
                 offender = i
                 break
@@ -117,7 +127,7 @@ CONTACT = 0.01
 
 
 @inline
-def note_parting(n, y, dt, rates, parting):  # type: ignore[no-untyped-def]
+def note_parting(n, y, dt, params, rates, parting):  # type: ignore[no-untyped-def]
     """Keep how fast the ends of each slack cable part, unless a burst of catches is on; last, the time since a catch.
 
     What stops a drone and the load is judged by the speed before any cable of the burst was caught: which of them
@@ -127,11 +137,9 @@ def note_parting(n, y, dt, rates, parting):  # type: ignore[no-untyped-def]
     if parting[n] <= CONTACT:
         return
     for i in range(n):
-        o = LOAD + DRONE * i
-        x, y_, z, _ = line(y, o)
-        parting[i] = (
-            x * (y[3] - y[o + 3]) + y_ * (y[4] - y[o + 4]) + z * (y[5] - y[o + 5]) - rates[i]
-        )
+        x, y_, z, _ = line(i, y, params)
+        vx, vy, vz = parting_speed(i, y, params)
+        parting[i] = x * vx + y_ * vy + z * vz - rates[i]
 
 
 @inline
@@ -139,7 +147,7 @@ def catch(  # type: ignore[no-untyped-def]
     n, y, attached, slow, params, lengths, rates, taut, held, T, alpha, b, parting, catch_impulses
 ):
     """Find the taut cables, those at full length that shorten at most ``slow``; impulses stop any that grow."""
-    lines(n, y, alpha, b)
+    lines(n, y, params, alpha, b)
     beyond = False
     for i in range(n):
         over = b[i] - lengths[i]
@@ -147,19 +155,19 @@ def catch(  # type: ignore[no-untyped-def]
         beyond = beyond or (taut[i] > 0.0 and over > 0.5 * NEAR)
     if beyond:  # or a cable that is not held would overrun again at once
         tighten(n, y, taut, params, lengths, T, alpha, b)
-        lines(n, y, alpha, b)
-    closing(n, y, alpha, rates, b)
+        lines(n, y, params, alpha, b)
+    closing(n, y, params, alpha, rates, b)
     jerk = False
     for i in range(n):
         if taut[i] > 0.0 and b[i] > SLOW:
             jerk = True
             speed = parting[i] if parting[i] > SLOW else b[i]
-            catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, speed, params))
+            catch_impulses[i] = max(catch_impulses[i], catch_impulse(i, y, speed, params))
             parting[i] = parting[n] = 0.0
     if jerk:
-        complementarity(n, alpha, b, taut, params, held, T)
-        pull(n, alpha, T, params, 3, y)
-        closing(n, y, alpha, rates, b)
+        complementarity(n, y, alpha, b, taut, params, held, T)
+        pull(n, y, alpha, T, params, 3, y)
+        closing(n, y, params, alpha, rates, b)
     for i in range(n):
         if b[i] < -slow:
             taut[i] = 0.0
@@ -186,7 +194,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     bends = column(memory, 4 * size, n, SPANS.bend)
     winches, moving = sees.winches, turning(n, sees.winches, now.time, dt)
     wind(n, winches, now.time, params, L, rates, bends)
-    note_parting(n, y, dt, rates, parting)
+    note_parting(n, y, dt, params, rates, parting)
     left = dt
     for event in range(EVENTS * n + 1):
         last = event == EVENTS * n
@@ -202,9 +210,9 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if params[P.ground] > 0.0:
             forces = writes.ground_forces if event == 0 else spare
             touch(n, y, anchors, w, params, forces, slope)
-        lines(n, y, alpha, b)
-        demand(n, y, slope, alpha, bends, b)
-        complementarity(n, alpha, b, taut, params, held, T)
+        lines(n, y, params, alpha, b)
+        demand(n, y, slope, params, alpha, bends, b)
+        complementarity(n, y, alpha, b, taut, params, held, T)
         raise_peaks(n, T, peak_tensions)
         if event == 0:
             for i in range(n):
@@ -231,7 +239,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                     m = params[MASS + BODY * i]
                     happened = happened or T[i] < -1e-9 * m * max(1.0, abs(b[i]))
                 elif attached[i] > 0.0:
-                    happened = happened or line(y, LOAD + DRONE * i)[3] > L[i] + NEAR
+                    happened = happened or line(i, y, params)[3] > L[i] + NEAR
             if last:
                 break
             if happened:

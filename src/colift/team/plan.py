@@ -12,9 +12,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from colift.kernel.signals import LEVEL
-from colift.team import Team
-from colift.team.geometry import Array, ring
+from colift.team.bodies import Team
+from colift.team.geometry import Array, matrix_of, ring
 
 LEAN = math.radians(30.0)
 """Angle of cables from the vertical, unless distances ask for more."""
@@ -30,7 +29,7 @@ MIDDLE = 0.15
 
 def plan(
     team: Team,
-    attitude: ArrayLike = LEVEL,
+    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     *,
     lean: float = LEAN,
     widest: float = math.radians(60.0),
@@ -58,7 +57,7 @@ def plan(
         What no formation holds, such as a load whose weight lies outside of its attachments, is held as far as it can be.
 
     """
-    arms = team.levers @ matrix_of(np.asarray(attitude, dtype=float)).T
+    arms = team.levers @ matrix_of(attitude).T
     weight = team.load_mass * max(team.gravity, 1e-3)
     sizes = np.broadcast_to(np.asarray(distance, dtype=float), team.n)
     needed = SPARE * 0.5 * (sizes[:, None] + sizes[None, :])
@@ -73,18 +72,6 @@ def plan(
     assert best is not None
     tensions = np.linalg.norm(best, axis=1)
     return np.asarray(best / tensions[:, None]), np.asarray(tensions)
-
-
-def matrix_of(attitude: Array) -> Array:
-    """Rotation (3, 3) of a unit quaternion wxyz."""
-    w, x, y, z = attitude / np.linalg.norm(attitude)
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
 
 
 def wrench_map(arms: Array) -> Array:

@@ -1,0 +1,155 @@
+"""Place and attitude of a rigid load: a geometric PID on SE(3) beside the feed-forward of its motion.
+
+After Lee, Leok and McClamroch (CDC 2010), with the force at the centre of mass ``c``::
+
+    F = m (g e3 + a_d) - f - K_p e_x - K_d e_v,        e_x = (x + R c) - (x_d + R_d c),  a_d of that point
+    M = Omega x J Omega - J (Omega x R^T R_d Omega_d - R^T R_d Omega_d') - K_R e_R - K_W e_W - K_I int e_R
+    e_R = 1/2 (R_d^T R - R^T R_d)^v,                   e_W = Omega - R^T R_d Omega_d
+
+``f`` is what observers make of the force on the load. The gains are frequencies: ``K_R = J w^2``, ``K_W = 2 zeta J w``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from colift.control.load_control.base import SIGNATURE, LoadControlPart
+from colift.control.tuning import Delays, sway
+from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
+from colift.kernel.math import quaternion
+from colift.kernel.math.small import cross, matrix_times
+from colift.kernel.math.smooth import decay
+from colift.part import Setup, Vector
+from colift.team import Team
+
+PARAMS = Layout(
+    team={
+        "m": 1, "g": 1, "rate": 1, "tangent": 1, "k_p": 1, "k_d": 1, "k_R": 1, "k_W": 1, "k_I": 1,
+        "J": 9, "centre": 3, "most": 1,
+    }
+)  # fmt: skip
+MEMORY = Layout(team={"push": 3, "moment": 3})
+"""Filtered external force on the load, N; integral part of the moment, in its frame, N m."""
+P, M = PARAMS.at, MEMORY.at
+
+
+@kernel(SIGNATURE)
+def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    load, reference, forces, u_L = (
+        sees.estimated_load,
+        sees.reference,
+        sees.estimated_forces,
+        writes.force,
+    )
+    q, w = sees.estimated_load_attitude, sees.estimated_load_rates
+    q_d, w_d = sees.reference_attitude, sees.reference_rates
+    m, g, last = params[P.m], params[P.g], sees.estimated_forces.shape[0] - 1
+    c = (params[P.centre], params[P.centre + 1], params[P.centre + 2])
+    Omega = (w[0], w[1], w[2])
+    # The wanted rates in the frame of the load as it is: E = R^T R_d.
+    ew, ex, ey, ez = quaternion.multiply(
+        q[0], -q[1], -q[2], -q[3], q_d[0], q_d[1], q_d[2], q_d[3]
+    )  # fmt: skip
+    wanted = quaternion.into_world(ew, ex, ey, ez, w_d[0, 0], w_d[0, 1], w_d[0, 2])
+    turning = quaternion.into_world(ew, ex, ey, ez, w_d[1, 0], w_d[1, 1], w_d[1, 2])
+    # 1/2 (R_d^T R - R^T R_d)^v is the imaginary part of E, times -2 ew: the sine of the angle along the axis.
+    e_R = (-2.0 * ew * ex, -2.0 * ew * ey, -2.0 * ew * ez)
+    e_W = (Omega[0] - wanted[0], Omega[1] - wanted[1], Omega[2] - wanted[2])
+    J = P.J
+    gyration = cross(Omega, matrix_times(J, params, Omega))
+    ahead = cross(Omega, wanted)
+    ahead = matrix_times(
+        J, params, (turning[0] - ahead[0], turning[1] - ahead[1], turning[2] - ahead[2])
+    )
+    turn = matrix_times(J, params, e_R)
+    spin = matrix_times(J, params, e_W)
+    stands = sees.standing[last] != 0.0
+    moment = writes.moment
+    for k in range(3):
+        S = M.moment + k
+        if not stands:
+            memory[S] -= now.dt * params[P.k_I] * turn[k]
+        memory[S] = min(max(memory[S], -params[P.most]), params[P.most])
+        moment[k] = gyration[k] + ahead[k] - params[P.k_R] * turn[k] - params[P.k_W] * spin[k]
+        moment[k] += memory[S]
+    mx, my, mz = quaternion.into_world(q[0], q[1], q[2], q[3], moment[0], moment[1], moment[2])
+    moment[0], moment[1], moment[2] = mx, my, mz
+
+    # The centre of mass, as it is and as it should be.
+    at = quaternion.into_world(q[0], q[1], q[2], q[3], c[0], c[1], c[2])
+    flow = cross(Omega, c)
+    speed = quaternion.into_world(q[0], q[1], q[2], q[3], flow[0], flow[1], flow[2])
+    at_d = quaternion.into_world(q_d[0], q_d[1], q_d[2], q_d[3], c[0], c[1], c[2])
+    o, o1 = (w_d[0, 0], w_d[0, 1], w_d[0, 2]), (w_d[1, 0], w_d[1, 1], w_d[1, 2])
+    flow_d = cross(o, c)
+    speed_d = quaternion.into_world(q_d[0], q_d[1], q_d[2], q_d[3], flow_d[0], flow_d[1], flow_d[2])
+    bend, twist = cross(o, flow_d), cross(o1, c)
+    motion = quaternion.into_world(
+        q_d[0], q_d[1], q_d[2], q_d[3], bend[0] + twist[0], bend[1] + twist[1], bend[2] + twist[2]
+    )  # fmt: skip
+    share = 1.0 if stands else 1.0 - decay(now.dt, 1.0 / params[P.rate])
+    for k in range(3):
+        memory[M.push + k] += share * (forces[last, k] - memory[M.push + k])
+        planned = m * (reference[2, k] + motion[k] + (g if k == 2 else 0.0)) - memory[M.push + k]
+        e_x = load[0, k] + at[k] - reference[0, k] - at_d[k]
+        e_v = load[1, k] + speed[k] - reference[1, k] - speed_d[k]
+        writes.steady_force[k] = planned
+        u_L[k] = planned - params[P.k_p] * e_x - params[P.k_d] * e_v
+    # Keep the cables taut and the formation upright: a force up, within a cone.
+    u_L[2] = max(u_L[2], 0.3 * m * g)
+    across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
+    if across > params[P.tangent] * u_L[2]:
+        u_L[0] *= params[P.tangent] * u_L[2] / across
+        u_L[1] *= params[P.tangent] * u_L[2] / across
+
+
+class Pose(LoadControlPart, Delays):
+    """A rigid load's place and attitude: feed-forward of its motion, geometric PID of its attitude.
+
+    Its place is held by the formation of the drones (position control of kind ``formation``); ``place`` adds feedback of its own.
+    """
+
+    kernel = _pose
+    remembers = MEMORY
+
+    place: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    """Natural frequency of the feedback of the place, rad/s; critically damped."""
+    turn: Annotated[float, Field(ge=0.0, le=50.0)] = 3.0
+    """Natural frequency of the feedback of the attitude, rad/s."""
+    damping: Annotated[float, Field(ge=0.0, le=5.0)] = 1.0
+    """Its damping ratio."""
+    integral: Annotated[float, Field(ge=0.0, le=5.0)] = 0.3
+    """Rate at which a lasting error of the attitude is integrated, over that frequency; 0: not at all."""
+    most_moment: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
+    """Bound on the integral, over weight and half the largest edge of the load."""
+    rate: Annotated[float, Field(gt=0.0, le=5.0)] = 0.45
+    """How fast the observed force is followed, over the bandwidth of the velocity loop."""
+    max_lean_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 60.0
+    """Most lean of the wanted force from the vertical, degrees."""
+
+    def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
+        yield from self.delay_warnings(mission, "load_control")
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        if team.body is None:
+            return [("kind", "controls an attitude: the load must be rigid (load.kind)")]
+        return super().check(team)
+
+    def params(self, team: Team) -> Vector:
+        assert team.body is not None
+        rate = min(self.rate * self.bandwidths(team).velocity, sway(team))
+        weight, w = team.load_mass * team.gravity, self.turn
+        return PARAMS.pack(
+            team.n, m=team.load_mass, g=team.gravity, rate=rate,
+            tangent=math.tan(math.radians(self.max_lean_deg)),
+            k_p=team.load_mass * self.place**2, k_d=2.0 * team.load_mass * self.place,
+            k_R=w * w, k_W=2.0 * self.damping * w, k_I=self.integral * w**3,
+            J=team.body.inertia.ravel(), centre=team.body.centre,
+            most=self.most_moment * weight * 0.5 * float(np.max(team.body.size)),
+        )  # fmt: skip

@@ -1,0 +1,87 @@
+"""Nominal pulls of the cables of a rigid load, where its reference plans none: what its wanted motion asks of them, with two derivatives.
+
+The wanted pose and its derivatives ask for a force ``F`` and a moment ``M``; the plan of the formation, turned to them, and
+the nearest forces that make them exactly are what an allocator answers that nothing limits (:mod:`colift.control.allocation.common.wrench`). As they are free
+of noise, their derivatives are differences. So what a load is wanted to do passes to the drones without the lag of the filter
+that corrections go through.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from colift.control.allocation.common import wrench
+from colift.kernel.jit import aside
+from colift.kernel.layout import Layout
+from colift.kernel.math import quaternion
+from colift.kernel.math.small import cross, matrix_times
+from colift.part import Vector
+from colift.team import Team
+from colift.team.plan import plan
+
+NUMBERS = Layout(team={"m": 1, "g": 1, "kind": 1, "axis": 3, "J": 9, "centre": 3})
+"""Parameters, behind which plan and levers of all cables follow (3 n each); ``kind`` and ``axis`` of the wrenches that they can make."""
+N = NUMBERS.at
+STATE = Layout(team={"calls": 1})
+"""Memory, behind which forces and ends (3 n each) and the nominal pulls (9 n) follow."""
+
+
+def numbers(team: Team) -> Vector:
+    """Parameters for a team; none for a load that is a point."""
+    if team.body is None:
+        return np.zeros(0)
+    directions, tensions = plan(team)
+    kind, axis = wrench.spanned(team)
+    share = tensions[:, None] * directions / (team.load_mass * max(team.gravity, 1e-3))
+    own = NUMBERS.pack(
+        team.n, m=team.load_mass, g=team.gravity, kind=kind, axis=axis, J=team.body.inertia.ravel(),
+        centre=team.body.centre,
+    )  # fmt: skip
+    return np.concatenate([own, share.ravel(), team.levers.ravel()])
+
+
+def room(team: Team) -> int:
+    """Length of the memory."""
+    return 0 if team.body is None else STATE.size(0) + 15 * team.n
+
+
+@aside
+def plan_pulls(n, reference, attitude, rates, dt, keep, params, memory):  # type: ignore[no-untyped-def]
+    """Fill the nominal pulls (n, 3, 3), the last in the memory; ``keep`` is what a filter keeps of the second derivative."""
+    first, count = N.rows, 3 * n
+    share, levers = params[first : first + count], params[first + count : first + 2 * count]
+    w, ends = memory[1 : 1 + count], memory[1 + count : 1 + 2 * count]
+    qw, qx, qy, qz = attitude[0], attitude[1], attitude[2], attitude[3]
+    Omega = (rates[0, 0], rates[0, 1], rates[0, 2])
+    turning = (rates[1, 0], rates[1, 1], rates[1, 2])
+    J, m = N.J, params[N.m]
+    c = (params[N.centre], params[N.centre + 1], params[N.centre + 2])
+    gyration = cross(Omega, matrix_times(J, params, Omega))
+    M = matrix_times(J, params, turning)
+    mx, my, mz = quaternion.into_world(
+        qw, qx, qy, qz, M[0] + gyration[0], M[1] + gyration[1], M[2] + gyration[2]
+    )
+    bend, twist = cross(Omega, cross(Omega, c)), cross(turning, c)
+    ax, ay, az = quaternion.into_world(
+        qw, qx, qy, qz, bend[0] + twist[0], bend[1] + twist[1], bend[2] + twist[2]
+    )
+    fx, fy = m * (reference[2, 0] + ax), m * (reference[2, 1] + ay)
+    fz = max(m * (reference[2, 2] + az + params[N.g]), 0.1 * m * params[N.g])
+    W = max((fx * fx + fy * fy + fz * fz) ** 0.5, 1e-9)
+    wrench.turned(qw, qx, qy, qz, n, levers, ends)
+    cos_yaw, sin_yaw = wrench.heading(qw, qx, qy, qz)
+    wrench.planned(n, fx, fy, fz, W, cos_yaw, sin_yaw, share, w)
+    o = N.axis
+    ax, ay, az = quaternion.into_world(qw, qx, qy, qz, params[o], params[o + 1], params[o + 2])
+    ux, uy, uz, vx, vy, vz = wrench.unmet(n, fx, fy, fz, mx, my, mz, ends, w)
+    wrench.correct(n, params[N.kind], ax, ay, az, ux, uy, uz, vx, vy, vz, ends, w)
+    calls = memory[0]
+    memory[0] = min(calls + 1.0, 3.0)
+    for i in range(n):
+        o = 1 + 2 * count + 9 * i
+        for k in range(3):
+            rate = 0.0 if calls < 1.0 else (w[3 * i + k] - memory[o + k]) / dt
+            bend_k = 0.0 if calls < 2.0 else (rate - memory[o + 3 + k]) / dt
+            memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend_k
+            memory[o + 3 + k] = rate
+            memory[o + k] = w[3 * i + k]

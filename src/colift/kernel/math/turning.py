@@ -1,0 +1,52 @@
+"""A load's wanted attitude, from angles that are functions of time.
+
+The angles turn it about its third axis (yaw), then its second (pitch), then its first (roll), ``R = Rz(psi) Ry(theta) Rx(phi)``, so::
+
+    Omega = (phi' - psi' sin theta,  theta' cos phi + psi' cos theta sin phi,  psi' cos theta cos phi - theta' sin phi)
+
+Derivatives are carried along as truncated series ``(value, first, second)``.
+"""
+
+from __future__ import annotations
+
+import math
+
+from colift.kernel.jit import aside, inline
+
+
+@inline
+def _times(a, b):  # type: ignore[no-untyped-def]
+    """Product of two series."""
+    return a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]
+
+
+@inline
+def _waves(angle):  # type: ignore[no-untyped-def]
+    """Series of sine and cosine of an angle with its derivatives."""
+    s, c = math.sin(angle[0]), math.cos(angle[0])
+    a1, a2 = angle[1], angle[2]
+    return (s, c * a1, c * a2 - s * a1 * a1), (c, -s * a1, -s * a2 - c * a1 * a1)
+
+
+@aside
+def turn_to(roll, pitch, yaw, attitude, rates):  # type: ignore[no-untyped-def]
+    """Fill the attitude (4,) and the rates with two derivatives (3, 3) from three angles, each with three derivatives (4,), rad."""
+    cr, sr = math.cos(0.5 * roll[0]), math.sin(0.5 * roll[0])
+    cp, sp = math.cos(0.5 * pitch[0]), math.sin(0.5 * pitch[0])
+    cy, sy = math.cos(0.5 * yaw[0]), math.sin(0.5 * yaw[0])
+    attitude[0] = cy * cp * cr + sy * sp * sr
+    attitude[1] = cy * cp * sr - sy * sp * cr
+    attitude[2] = cy * sp * cr + sy * cp * sr
+    attitude[3] = sy * cp * cr - cy * sp * sr
+    sine_r, cosine_r = _waves(roll)
+    sine_p, cosine_p = _waves(pitch)
+    d_roll = (roll[1], roll[2], roll[3])
+    d_pitch = (pitch[1], pitch[2], pitch[3])
+    d_yaw = (yaw[1], yaw[2], yaw[3])
+    sunk, level = _times(d_yaw, sine_p), _times(d_yaw, cosine_p)
+    q1, q2 = _times(d_pitch, cosine_r), _times(level, sine_r)
+    r1, r2 = _times(level, cosine_r), _times(d_pitch, sine_r)
+    for m in range(3):
+        rates[m, 0] = d_roll[m] - sunk[m]
+        rates[m, 1] = q1[m] + q2[m]
+        rates[m, 2] = r1[m] - r2[m]
