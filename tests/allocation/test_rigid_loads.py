@@ -17,7 +17,7 @@ from colift.control.allocation.wrench_min_norm import WrenchMinNorm
 from colift.team import Body, Team
 from colift.team.geometry import matrix_of
 from colift.team.load import box_inertia, usual_attachments
-from colift.team.plan import plan, wrench_map
+from colift.team.plan import least_lean, plan, unheld, wrench_map
 
 SIZE = np.array([0.6, 0.4, 0.2])
 MASS = 0.5
@@ -317,6 +317,27 @@ def test_rotors_keep_off_the_cables_of_others():
                     s = np.clip((drones[i] - team.levers[j]) @ cable / (cable @ cable), 0.0, 1.0)
                     gap = np.linalg.norm(drones[i] - team.levers[j] - s * cable)
                     assert gap >= asked[i] - 1e-9
+
+
+def test_what_drones_that_are_left_cannot_hold_is_told():
+    part, four, six = SafeWrench(), team_of(4), team_of(6)
+    thrusts = np.full(6, 9.0)
+    assert part.cannot_hold(four, thrusts[:4], plan(four)[0]) == []
+    assert part.cannot_hold(six.of([0, 1, 2, 3, 5]), thrusts[:5], plan(six)[0]) == []
+    # Of the cables on four corners three hold the load only where the lost corner sinks.
+    three = four.of([0, 1, 3])
+    assert unheld(three, (1.0, 0.0, 0.0, 0.0), *plan(three)) > 1e-3
+    angle, attitude = least_lean(three)
+    assert 0.0 < angle <= math.radians(20.0)
+    assert unheld(three, attitude, *plan(three, attitude)) < 1e-6
+    corner = four.levers[2]
+    assert (matrix_of(attitude) @ corner)[2] < corner[2]
+    assert part.cannot_hold(three, thrusts[:3], plan(four)[0]) == []
+    two = four.of([0, 1])
+    (problem,) = part.cannot_hold(two, thrusts[:2], plan(four)[0])
+    assert "neither level nor leaning" in problem
+    (problem,) = part.cannot_hold(four, np.full(4, 6.0), plan(four)[0])
+    assert "would need" in problem
 
 
 def test_limits_that_cross_are_told():
