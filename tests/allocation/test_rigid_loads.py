@@ -11,12 +11,13 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
 from colift.control.allocation.base import Allocator, Status
+from colift.control.allocation.limits import metres
 from colift.control.allocation.safe_wrench import SafeWrench, outward
 from colift.control.allocation.wrench_min_norm import WrenchMinNorm
 from colift.team import Body, Team
 from colift.team.geometry import matrix_of
 from colift.team.load import box_inertia, usual_attachments
-from colift.team.plan import plan, wrench_map
+from colift.team.plan import least_lean, plan, unheld, wrench_map
 
 SIZE = np.array([0.6, 0.4, 0.2])
 MASS = 0.5
@@ -318,6 +319,27 @@ def test_rotors_keep_off_the_cables_of_others():
                     assert gap >= asked[i] - 1e-9
 
 
+def test_what_drones_that_are_left_cannot_hold_is_told():
+    part, four, six = SafeWrench(), team_of(4), team_of(6)
+    thrusts = np.full(6, 9.0)
+    assert part.cannot_hold(four, thrusts[:4], plan(four)[0]) == []
+    assert part.cannot_hold(six.of([0, 1, 2, 3, 5]), thrusts[:5], plan(six)[0]) == []
+    # Of the cables on four corners three hold the load only where the lost corner sinks.
+    three = four.of([0, 1, 3])
+    assert unheld(three, (1.0, 0.0, 0.0, 0.0), *plan(three)) > 1e-3
+    angle, attitude = least_lean(three)
+    assert 0.0 < angle <= math.radians(20.0)
+    assert unheld(three, attitude, *plan(three, attitude)) < 1e-6
+    corner = four.levers[2]
+    assert (matrix_of(attitude) @ corner)[2] < corner[2]
+    assert part.cannot_hold(three, thrusts[:3], plan(four)[0]) == []
+    two = four.of([0, 1])
+    (problem,) = part.cannot_hold(two, thrusts[:2], plan(four)[0])
+    assert "neither level nor leaning" in problem
+    (problem,) = part.cannot_hold(four, np.full(4, 6.0), plan(four)[0])
+    assert "would need" in problem
+
+
 def test_limits_that_cross_are_told():
     team = team_of(4)
     (problem,) = SafeWrench(tension_min=3.0, tension_max=3.1).check(team)
@@ -325,3 +347,39 @@ def test_limits_that_cross_are_told():
     (problem,) = SafeWrench(max_thrust=5.0).conflicts(team)
     assert "needs a quarter more" in problem[1]
     assert SafeWrench(min_distance=[0.3] * 3).check(team)
+
+
+def test_a_slew_limit_spreads_a_jump_of_the_level_force_over_cycles():
+    team = team_of(4)
+    part = SafeWrench(slew=0.6, max_rate=2.0)
+    allocator = allocator_of(part, team)
+    allocator.allocate([0.0, 0.0, WEIGHT])
+    most = 0.6 * WEIGHT * 2.0 * 0.01
+    for k in range(1, 4):
+        answer = allocator.allocate([2.5 * most, 0.0, WEIGHT])
+        given = -(answer.tensions @ answer.directions)
+        assert_allclose(given, [min(k, 2.5) * most, 0.0, WEIGHT], atol=1e-9)
+        assert answer.status is (Status.FORCE_REDUCED if k < 3 else Status.CONVERGED)
+
+
+@pytest.mark.parametrize("kind", [metres.ROTOR, metres.ROTOR_BACK, metres.CABLES])
+def test_a_distance_is_the_least_of_all_points_and_its_normal_the_slope(kind, monkeypatch):
+    rng = np.random.default_rng(kind)
+    steps = np.linspace(0.0, 1.0, 101)
+
+    plain = getattr(metres.apart, "py_func", metres.apart)  # too little to compile it for
+    monkeypatch.setattr(metres, "closest", getattr(metres.closest, "py_func", metres.closest))
+
+    def distance(e, p, q):
+        return plain(kind, 0.25, *e.tolist(), *p.tolist(), *q.tolist())
+
+    for _ in range(30):
+        e, p, q = rng.normal(size=(3, 3))
+        size, *normal, s, t = distance(e, p, q)
+        first = steps[:, None] * p if kind != metres.ROTOR else p[None]
+        second = steps[:, None] * q if kind != metres.ROTOR_BACK else q[None]
+        grid = np.linalg.norm(e + first[:, None] - second[None], axis=2).min()
+        assert grid - 0.02 <= size <= grid + 1e-12
+        d = 1e-6 * rng.normal(size=3)
+        assert_allclose(distance(e, p + d, q)[0] - size, s * np.dot(normal, d), atol=1e-10)
+        assert_allclose(distance(e, p, q + d)[0] - size, -t * np.dot(normal, d), atol=1e-10)

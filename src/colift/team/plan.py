@@ -8,6 +8,7 @@ tensions share the weight so that it does not tip; a last correction of least no
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +22,10 @@ WIDER = math.radians(1.0)
 """Step in which the ring is widened."""
 SPARE = 1.15
 """Distances of the plan, over those that are asked for."""
-FLOOR = 0.2
+FLOOR = 0.05
 """Least upright part of a tension, over a cable's share of the weight."""
+ENOUGH = 1e-6
+"""Of the weight, what a plan that holds the load may leave of it."""
 MIDDLE = 0.15
 """Attachments that are closer to the middle than this part of the farthest one have no azimuth."""
 
@@ -35,6 +38,7 @@ def plan(
     widest: float = math.radians(60.0),
     distance: ArrayLike = 0.0,
     downwash: float = 2.0,
+    least: ArrayLike | None = None,
 ) -> tuple[Array, Array]:
     """Directions (n, 3), from drone to load, and tensions (n,), N, that hold the load in this attitude.
 
@@ -50,6 +54,8 @@ def plan(
         Between drones, m: two keep the mean of theirs.
     downwash : float
         How much more of it drones keep above each other than beside each other.
+    least : float or (n,) array, optional
+        Upright part of the tensions, N; a twentieth of a cable's share of the weight when left out.
 
     Returns
     -------
@@ -59,11 +65,12 @@ def plan(
     """
     arms = team.levers @ matrix_of(attitude).T
     weight = team.load_mass * max(team.gravity, 1e-3)
+    floors = np.broadcast_to(FLOOR * weight / team.n if least is None else least, team.n)
     sizes = np.broadcast_to(np.asarray(distance, dtype=float), team.n)
     needed = SPARE * 0.5 * (sizes[:, None] + sizes[None, :])
     best, most = None, -math.inf
     for angle in np.arange(min(lean, widest), widest + 1e-9, WIDER):
-        found = _held(arms, _outward(arms, team.cable_lengths, float(angle)), weight)
+        found = _held(arms, _outward(arms, team.cable_lengths, float(angle)), weight, floors)
         ratio = _clearance(arms, team.cable_lengths, found, needed, downwash)
         if ratio > most:
             best, most = found, ratio
@@ -72,6 +79,39 @@ def plan(
     assert best is not None
     tensions = np.linalg.norm(best, axis=1)
     return np.asarray(best / tensions[:, None]), np.asarray(tensions)
+
+
+def unheld(team: Team, attitude: ArrayLike, directions: Array, tensions: Array) -> float:
+    """What these cables leave of the load's weight and its moment in this attitude, over the weight; moments over the largest arm."""
+    arms = team.levers @ matrix_of(np.asarray(attitude, dtype=float)).T
+    left = wrench_map(arms) @ (tensions[:, None] * directions).ravel()
+    weight = team.load_mass * max(team.gravity, 1e-3)
+    left[2] += weight
+    left[3:] /= max(float(np.abs(arms).max()), 1e-3)
+    return float(np.abs(left).max()) / weight
+
+
+def least_lean(
+    team: Team, *, most: float = math.radians(20.0), **of_plan: Any
+) -> tuple[float, Array] | None:
+    """Least angle, rad, by which the load leans where a plan holds it, and that attitude (4,); None where none does.
+
+    Level first, then leaning in every direction, in steps of 5 degrees: a load that has lost the cable at one corner hangs on
+    the others when that corner sinks. Of one angle the direction whose smallest tension is largest.
+    """
+    most = most if team.n > 2 else 0.0
+    for angle in np.arange(0.0, most + 1e-9, math.radians(5.0)):
+        best, found = 0.0, None
+        for azimuth in np.arange(1 if angle == 0.0 else 12) * (math.pi / 6.0):
+            half = 0.5 * angle
+            axis = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+            attitude = np.array([math.cos(half), *(math.sin(half) * axis)])
+            directions, tensions = plan(team, attitude, **of_plan)
+            if unheld(team, attitude, directions, tensions) <= ENOUGH and tensions.min() > best:
+                best, found = float(tensions.min()), attitude
+        if found is not None:
+            return float(angle), found
+    return None
 
 
 def wrench_map(arms: Array) -> Array:
@@ -108,10 +148,9 @@ def _outward(arms: Array, lengths: Array, angle: float) -> Array:
     return directions
 
 
-def _held(arms: Array, directions: Array, weight: float) -> Array:
+def _held(arms: Array, directions: Array, weight: float, floors: Array) -> Array:
     """Cable forces (n, 3) near these directions that balance the weight."""
     n = len(arms)
-    floor = FLOOR * weight / n
     upright = np.full(n, weight / n)
     free = np.ones(n, dtype=bool)
     for _ in range(n):
@@ -119,8 +158,8 @@ def _held(arms: Array, directions: Array, weight: float) -> Array:
         wanted = np.array([weight, 0.0, 0.0]) - rows @ upright
         step = np.linalg.lstsq(rows[:, free], wanted, rcond=1e-9)[0]
         upright[free] += step
-        low = free & (upright < floor)
-        upright[low] = floor
+        low = free & (upright < floors)
+        upright[low] = floors[low]
         if not low.any() or low.sum() == free.sum():
             break
         free &= ~low
@@ -129,7 +168,7 @@ def _held(arms: Array, directions: Array, weight: float) -> Array:
     wanted = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0]) - balance @ forces.ravel()
     step = np.linalg.lstsq(balance, wanted, rcond=1e-9)[0].reshape(n, 3)
     corrected = forces + step
-    return corrected if np.all(-corrected[:, 2] > 0.5 * floor) else forces
+    return corrected if np.all(-corrected[:, 2] > 0.5 * floors) else forces
 
 
 def _clearance(arms: Array, lengths: Array, forces: Array, needed: Array, downwash: float) -> float:

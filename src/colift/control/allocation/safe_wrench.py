@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ from colift.kernel.math.columns import column
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
-from colift.team.plan import plan
+from colift.team.plan import least_lean, plan
 
 _CONVERGED = int(Status.CONVERGED)
 _ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
@@ -857,6 +857,27 @@ class SafeWrench(AllocatorPart):
             f"{', '.join(names)}: start within the limits, or ask for less"
         )
 
+    def cannot_hold(self, team: Team, thrusts: Vector, directions: Array) -> list[str]:
+        """By its plan, level or leaning: what that needs of attachments, tensions and thrusts."""
+        held = least_lean(team, **self._asked(team))
+        if held is None:
+            return [
+                f"its {team.n} cables hold the load neither level nor leaning: its weight is not between their ends"
+            ]
+        along, tensions = self.formation(team, held[1])
+        problems = []
+        caps = self.tension_caps(team)
+        if np.any(tensions > caps):
+            i = int(np.argmax(tensions - caps))
+            problems.append(
+                f"cable {i} would need {tensions[i]:.3g} N of tension_max = {caps[i]:.3g}"
+            )
+        needed = team.hover_thrusts(tensions, along)
+        if np.any(needed > thrusts):
+            i = int(np.argmax(needed - thrusts))
+            problems.append(f"drone {i} would need {needed[i]:.3g} N of its {thrusts[i]:.3g} N")
+        return problems
+
     def turn_rate(self, team: Team) -> float:
         """Fastest turn of a cable's direction, rad/s."""
         return float(self.settled("max_rate", team)[0])
@@ -889,15 +910,19 @@ class SafeWrench(AllocatorPart):
 
     def formation(self, team: Team, attitude: Array | None = None) -> tuple[Array, Array]:
         """Directions (n, 3) and tensions (n,), N, of the plan in hover; see :func:`colift.team.plan.plan`."""
+        level = (1.0, 0.0, 0.0, 0.0)
+        return plan(team, level if attitude is None else attitude, **self._asked(team))
+
+    def _asked(self, team: Team) -> dict[str, Any]:
+        """What is asked of a plan."""
         most = math.radians(self.max_cone_deg)
-        return plan(
-            team,
-            (1.0, 0.0, 0.0, 0.0) if attitude is None else attitude,
-            lean=min(math.radians(self.cone_deg), 0.9 * most),
-            widest=0.9 * most,
-            distance=self.drone_distances(team),
-            downwash=self.downwash,
-        )
+        return {
+            "lean": min(math.radians(self.cone_deg), 0.9 * most),
+            "widest": 0.9 * most,
+            "distance": self.drone_distances(team),
+            "downwash": self.downwash,
+            "least": 1.1 * self.tension_floors(team),
+        }
 
     def params(self, team: Team) -> Vector:
         n = team.n

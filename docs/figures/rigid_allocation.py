@@ -1,4 +1,4 @@
-"""The safe allocator for rigid loads, cycle by cycle: limits broken, wrenches missed and whether they had to be, time.
+"""Write how the safe allocator for rigid loads does, cycle by cycle (docs/theory/rigid-allocation.md): limits, misses, time.
 
 A box of 0.5 kg, 0.6 x 0.4 x 0.2 m, on cables of 1 m that end on its upper edges, drones of 0.5 kg, 100 Hz. The wrench is that of a
 smooth motion with attitude, the same with white noise on force, moment and measured attitude, or steps of both.
@@ -6,21 +6,21 @@ smooth motion with attitude, the same with white noise on force, moment and meas
 Every answer is judged by code that the allocator does not call. A miss is *proved* by a plane in the space of wrenches that parts the
 wanted one from all that cables within their tensions, cone and turns can make; what is not proved counts as avoidable.
 
-    python benchmarks/rigid_safety.py [--cycles 100000] [--drones 3 4 6 8] [--json FILE]
+From ``rigid_allocation.json`` beside this file: ``python docs/figures/rigid_allocation.py [--fly] [--cycles 100000] [--drones 3 4]``;
+``--fly`` measures anew, with other ``--cycles`` or ``--drones`` only to be looked at.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from pages import fill, stored, table
 
 from colift.control.allocation.base import INFO_SIZE, Beside, Status, ask
 from colift.control.allocation.limits.reach import farthest
@@ -35,7 +35,10 @@ Array = NDArray[np.float64]
 PERIOD = 0.01
 SIZE = np.array([0.6, 0.4, 0.2])
 MASS = 0.5
+CYCLES, DRONES = 100_000, [3, 4, 6, 8]
+DISTANCE = 0.5
 REPEATS = 5
+MISSED = 1e-6
 CASES = ("smooth", "white 0.1", "white 0.3", "raw steps", "slewed steps")
 
 
@@ -120,7 +123,7 @@ def asked(case: str, cycles: int, team: Team, rate: float, seed: int = 1) -> Ask
         motion, moment = jumps[np.arange(cycles) // every], tips[np.arange(cycles) // every]
         attitude = np.tile([1.0, 0.0, 0.0, 0.0], (cycles, 1))
         measured, spin, speed = attitude, np.zeros((cycles, 3)), np.zeros((cycles, 3))
-    force = MASS * (motion + [0.0, 0.0, team.gravity])
+    force = MASS * (motion + np.array([0.0, 0.0, team.gravity]))
     if case == "slewed steps":
         most = 0.6 * MASS * team.gravity * rate * PERIOD
         force[:, :2] = slewed(force[:, :2], most)
@@ -251,11 +254,10 @@ def _bounds(which, multipliers, wrenches, ends, before, low, high, turn, cone, p
         at = multipliers[c].copy()
         now = _bound(at, wrenches[c], ends[c], before[c], low, high, turn, cone, best)
         step = 0.1
-        np.random.seed(k)
+        np.random.seed(k)  # noqa: NPY002  # what compiled code has
         for _ in range(tries):
-            size = 0.0
             for m in range(6):
-                trial[m] = at[m] + step * prices[m] * np.random.normal()
+                trial[m] = at[m] + step * prices[m] * np.random.normal()  # noqa: NPY002
                 trial[m] = min(max(trial[m], -prices[m]), prices[m])
             value = _bound(trial, wrenches[c], ends[c], before[c], low, high, turn, cone, best)
             if value > now:
@@ -315,12 +317,11 @@ def violations(part: SafeWrench, team: Team, what: Asked, pulls: Array) -> dict[
             float((part.tension_floors(team) - tensions).max()),
             float((tensions - part.tension_caps(team)).max()),
         ),
-        "cone, deg": float(np.degrees(np.arccos(-along[..., 2].max(initial=-1.0)))) * 0.0
-        + float(np.degrees(np.arccos(np.clip(-along[..., 2], -1.0, 1.0))).max())
+        "cone, deg": float(np.degrees(np.arccos(np.clip(-along[..., 2], -1.0, 1.0))).max())
         - part.max_cone_deg,
         "turn, deg": math.degrees(float(turned.max()) - part.turn_rate(team) * PERIOD),
         "drones, m": float((0.5 * (sizes[i] + sizes[j]) - apart).max()),
-        "cables, m": part.gap(team) - rods,
+        "cables, m": part.gap(team) - float(rods),
         "box, deg": part.box_deg - float(surface.min(initial=math.inf)),
     }
     if np.isfinite(part.thrust_limits(team)).any():
@@ -346,56 +347,79 @@ def rod_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
     return np.where(inside, np.abs(np.sum((c - a) * normal, axis=1)) / np.sqrt(square), best)
 
 
+def measured(n: int, case: str, cycles: int) -> dict[str, Any]:
+    """One row."""
+    team = team_of(n)
+    part = SafeWrench(min_distance=DISTANCE)
+    what = asked(case, cycles, team, part.turn_rate(team))
+    answers = run(part, team, what)
+    for _ in range(REPEATS - 1):  # the same calls again: what is longer was interrupted
+        np.minimum(answers.times, run(part, team, what).times, out=answers.times)
+    miss = missed(team, what, answers.pulls)
+    which = np.flatnonzero(np.abs(miss).max(axis=1) > MISSED)
+    least = bounds(part, team, what, answers, which, 300)
+    lost = loss(team, miss[which])
+    hard = np.flatnonzero((least <= MISSED) | (lost > 1.1 * least))
+    least[hard] = bounds(part, team, what, answers, which[hard], 20_000)
+    proved = least > MISSED
+    ratios = lost[proved] / least[proved]
+    statuses = answers.state[:, 0]
+    return {
+        "n": n,
+        "case": case,
+        "cycles": cycles,
+        "iterations": float(answers.state[:, 1].mean()),
+        "most_iterations": int(answers.state[:, 1].max()),
+        "missed": len(which),
+        "avoidable": int(np.sum(~proved)),
+        "avoidable_loss": float(lost[~proved].max(initial=0.0)),
+        "loss": float(lost[proved].sum() / least[proved].sum()) if proved.any() else 1.0,
+        "over_1_1": int(np.sum(ratios > 1.1)),
+        "not_converged": int(np.sum(statuses == Status.ITERATION_LIMIT)),
+        "recovering": int(np.sum(statuses == Status.RECOVERING)),
+        "us": [float(q) * 1e-3 for q in np.quantile(answers.times, [0.5, 0.99, 1.0])],
+        **violations(part, team, what, answers.pulls),
+    }
+
+
+def share(count: int, cycles: int) -> str:
+    """In percent."""
+    return "0" if count == 0 else f"{100.0 * count / cycles:.3f}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cycles", type=int, default=100_000)
-    parser.add_argument("--drones", type=int, nargs="*", default=[3, 4, 6, 8])
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--fly", action="store_true")
+    parser.add_argument("--cycles", type=int, default=CYCLES)
+    parser.add_argument("--drones", type=int, nargs="*", default=DRONES)
     args = parser.parse_args()
-    rows: list[dict[str, Any]] = []
-    for n in args.drones:
-        team = team_of(n)
-        part = SafeWrench(min_distance=0.5)
-        for case in CASES:
-            what = asked(case, args.cycles, team, part.turn_rate(team))
-            answers = run(part, team, what)
-            for _ in range(REPEATS - 1):  # the same calls again: what is longer was interrupted
-                np.minimum(answers.times, run(part, team, what).times, out=answers.times)
-            miss = missed(team, what, answers.pulls)
-            given = np.abs(miss).max(axis=1)
-            lost = given > 1e-6
-            iterations = answers.state[:, 1]
-            which = np.flatnonzero(lost)
-            least = bounds(part, team, what, answers, which, 300)
-            proved = least > 1e-6
-            all_lost = loss(team, miss[which])
-            rest = np.flatnonzero(~proved)
-            if rest.size:
-                least[rest] = bounds(part, team, what, answers, which[rest], 20000)
-                proved = least > 1e-6
-            ratios = (all_lost / np.maximum(least, 1e-12))[proved]
-            row = {
-                "n": n,
-                "case": case,
-                "iterations": float(iterations.mean()),
-                "most": int(iterations.max()),
-                "missed_percent": 100.0 * float(lost.mean()),
-                "avoidable_percent": 100.0 * float(np.sum(~proved)) / args.cycles,
-                "unproved_loss": float(all_lost[~proved].max(initial=0.0)),
-                "ratio": round(float(all_lost[proved].sum() / max(least[proved].sum(), 1e-12)), 4),
-                "ratio_99": round(float(np.quantile(ratios, 0.99)), 3) if ratios.size else 1.0,
-                "over_1_1": int(np.sum(ratios > 1.1)),
-                "limited": 100.0 * float(np.mean(answers.state[:, 0] == Status.ITERATION_LIMIT)),
-                "recovering": 100.0 * float(np.mean(answers.state[:, 0] == Status.RECOVERING)),
-                "us": [
-                    round(float(q) * 1e-3, 2) for q in np.quantile(answers.times, [0.5, 0.99, 1.0])
-                ],
-                **{k: round(v, 6) for k, v in violations(part, team, what, answers.pulls).items()},
-            }
-            rows.append(row)
-            print(row, flush=True)
-    if args.json:
-        args.json.write_text(json.dumps(rows, indent=1))
+    cases = [(n, case) for n in args.drones for case in CASES]
+    if args.fly and (args.cycles != CYCLES or args.drones != DRONES):
+        for n, case in cases:
+            print(measured(n, case, args.cycles), flush=True)
+        return
+    rows = []
+    for row in stored(__file__, lambda: [measured(n, case, CYCLES) for n, case in cases]):
+        metres = max(value for name, value in row.items() if name.endswith(", m"))
+        others = max(row["tension, N"], row["turn, deg"], row["cone, deg"], row["box, deg"])
+        median, late, longest = row["us"]
+        rows.append(
+            [
+                str(row["n"]),
+                row["case"],
+                f"{row['iterations']:.2f} / {row['most_iterations']}",
+                share(row["missed"], row["cycles"]),
+                share(row["avoidable"], row["cycles"]),
+                f"{row['loss']:.3f}" if row["missed"] else "-",
+                f"{-1e3 * metres:+.1f} mm",
+                "kept" if max(metres, others) <= 1e-6 else f"broken by {max(metres, others):.2g}",
+                f"{median:.1f} / {late:.1f} / {longest:.1f}",
+            ]
+        )
+    header = [
+        "n", "case", "iterations, mean / most", "missed, %", "avoidable, %", "loss", "closest", "limits", "us, median / 99 % / worst",
+    ]  # fmt: skip
+    fill("theory/rigid-allocation.md", "rigid-allocation", table(header, rows))
 
 
 if __name__ == "__main__":
