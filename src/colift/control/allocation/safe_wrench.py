@@ -21,7 +21,6 @@ from colift.control.allocation.base import (
     AllocatorPart,
     Status,
 )
-from colift.control.allocation.common import wrench
 from colift.control.allocation.limits import elastic, metres
 from colift.control.allocation.limits.cycle import LEVEL as LEAN_MOST
 from colift.control.allocation.limits.cycle import MAX_TURN
@@ -37,12 +36,13 @@ from colift.control.allocation.limits.usual import (
 )
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion
+from colift.kernel.math import quaternion, wrench
 from colift.kernel.math.columns import column
+from colift.kernel.spans import BODY, LINE, POINT
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
-from colift.team.plan import least_lean, plan
+from colift.team.plan import least_lean, plan, spanned
 
 _CONVERGED = int(Status.CONVERGED)
 _ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
@@ -496,10 +496,10 @@ def slewed(fx, fy, most, memory):  # type: ignore[no-untyped-def]
 @inline
 def nothing(n, span, ax, ay, az, ends, lost):  # type: ignore[no-untyped-def]
     """Combinations of the wrench's rows that no cable force changes, into ``lost``; their number."""
-    if span == wrench.BODY:
+    if span == BODY:
         return 0
     cx, cy, cz = wrench.middle(n, ends)
-    if span == wrench.LINE:
+    if span == LINE:
         lost[0], lost[1], lost[2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
         lost[3], lost[4], lost[5] = ax, ay, az
         return 1
@@ -927,14 +927,14 @@ class SafeWrench(AllocatorPart):
     def params(self, team: Team) -> Vector:
         n = team.n
         directions, tensions = self.formation(team)
-        span, axis = wrench.spanned(team)
+        span, axis = spanned(team)
         sigma = max(_share(team), 1e-6)
         size = max(float(np.abs(team.levers).max()), 1e-3)
         most = self.thrust_limits(team)
         flying = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
         caps = self.tension_caps(team)
         sizes, rotors, gap = self.drone_distances(team), self.cable_distances(team), self.gap(team)
-        if span == wrench.POINT:
+        if span == POINT:
             rotors, gap = np.zeros(n), 0.0  # cables that meet come as near as they like
         outs = outward(team)
         level, tip = PRICES["horizontal"], PRICES["tip"]
