@@ -22,6 +22,12 @@ export interface Metric {
   value: number | null;
 }
 
+/** A rigid load, in its own frame, m. */
+export interface Body {
+  size: number[];
+  attachments: number[][];
+}
+
 export interface FlightInfo {
   name: string;
   label: string;
@@ -34,6 +40,8 @@ export interface FlightInfo {
   cable_lengths: number[];
   /** From a drone's centre to its outermost tip, m, where that is known. */
   radii: (number | null)[];
+  /** The load, unless it is a point. */
+  body: Body | null;
   /** Height of the ground, m, where there is one. */
   ground: number | null;
   /** Least angle that was asked for, if any was. */
@@ -101,6 +109,8 @@ export const WIDTHS = {
   desired_tensions: (n: number) => n,
   thrusts: (n: number) => n,
   reeled: (n: number) => n,
+  load_attitude: () => 4,
+  reference_attitude: () => 4,
   solve_time: () => 1,
   status: () => 1,
 };
@@ -111,7 +121,13 @@ export type Derived = "error" | "angle" | "spin";
 
 export const SIGNALS = Object.keys(WIDTHS) as Signal[];
 export type Row = Record<Signal, ArrayLike<number>>;
-export type Frame = Record<Signal | Derived, Float32Array> & { time: number; row: number; n: number };
+export type Frame = Record<Signal | Derived, Float32Array> & {
+  time: number;
+  row: number;
+  n: number;
+  /** Where each cable ends on the load. */
+  ends: Float32Array;
+};
 
 export class Flight {
   readonly time = new Column(1, new Float64Array(64));
@@ -216,15 +232,35 @@ export class Flight {
       }
       frame[name] = values;
     }
-    if (part > 0) turn(frame.attitudes, this.columns.attitudes, row, next, part);
+    if (part > 0) {
+      for (const name of ["attitudes", "load_attitude", "reference_attitude"] as const)
+        turn(frame[name], this.columns[name], row, next, part);
+    }
+    frame.ends = ends(frame, this.info.body);
     frame.status[0] = this.columns.status.at(row);
     return frame;
   }
 }
 
-/** Where cable i ends on the load: a point load has one place for all. */
-export function cableEnd(frame: Frame, _i: number): ArrayLike<number> {
-  return frame.load;
+/** Where the cables end on the load: on a point all in one place. */
+function ends(frame: Frame, body: Body | null): Float32Array {
+  const found = new Float32Array(3 * frame.n);
+  const [w, x, y, z] = frame.load_attitude as unknown as [number, number, number, number];
+  for (let i = 0; i < frame.n; i++) {
+    const [a, b, c] = (body?.attachments[i] ?? [0, 0, 0]) as [number, number, number];
+    // v + 2 w (q x v) + 2 q x (q x v)
+    const [e, f, g] = body ? [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)] : [0, 0, 0];
+    const turned = body
+      ? [a + w * e + y * g - z * f, b + w * f + z * e - x * g, c + w * g + x * f - y * e]
+      : [0, 0, 0];
+    for (let k = 0; k < 3; k++) found[3 * i + k] = frame.load[k]! + turned[k]!;
+  }
+  return found;
+}
+
+/** Where cable i ends on the load. */
+export function cableEnd(frame: Frame, i: number): ArrayLike<number> {
+  return frame.ends.subarray(3 * i, 3 * i + 3);
 }
 
 /** Attitudes between two rows: quaternions of opposite sign are the same attitude. */

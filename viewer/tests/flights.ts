@@ -12,6 +12,7 @@ export function info(n: number, changes: Partial<FlightInfo> = {}): FlightInfo {
     summary: "",
     n,
     cable_lengths: Array<number>(n).fill(1),
+    body: null,
     radii: Array<null>(n).fill(null),
     safe_angle_deg: null,
     ground: 0,

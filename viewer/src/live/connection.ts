@@ -1,6 +1,6 @@
 // The line to the server: it says hello, comes back by itself when lost, and hands on what it hears.
 
-import type { Mark } from "../data";
+import type { Body, Mark } from "../data";
 import type { Level } from "../tables";
 
 export interface Knob {
@@ -32,6 +32,7 @@ export interface Hello {
   n: number;
   cable_lengths: number[];
   radii: (number | null)[];
+  body: Body | null;
   safe_angle_deg: number | null;
   /** Height of the ground, m, where there is one. */
   ground: number | null;

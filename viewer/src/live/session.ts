@@ -168,6 +168,7 @@ function about(hello: Hello): FlightInfo {
     n: hello.n,
     cable_lengths: hello.cable_lengths,
     radii: hello.radii,
+    body: hello.body,
     safe_angle_deg: hello.safe_angle_deg,
     ground: hello.ground,
     weight: mass * GRAVITY,

@@ -1,15 +1,31 @@
-// The load, and where it should be.
+// The load, and where it should be: a point as a stone and a ring, a rigid load as a box and its edges.
 
-import { Group, IcosahedronGeometry, Mesh, MeshBasicMaterial, MeshLambertMaterial, TorusGeometry } from "three";
+import {
+  BoxGeometry,
+  EdgesGeometry,
+  Group,
+  IcosahedronGeometry,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  TorusGeometry,
+} from "three";
 import type { Maker } from "./element";
 
-export const load: Maker = (_flight, { drone }) => {
+/** Thinnest edge of a box that can be seen, over the size of a drone. */
+const THIN = 0.06;
+
+export const load: Maker = (flight, { drone }) => {
   const object = new Group();
-  const body = new Mesh(new IcosahedronGeometry(0.42 * drone, 1), new MeshLambertMaterial({ flatShading: true }));
-  const wanted = new Mesh(
-    new TorusGeometry(0.62 * drone, 0.035 * drone, 6, 40),
-    new MeshBasicMaterial(),
-  );
+  const rigid = flight.info.body;
+  const [x, y, z] = (rigid?.size ?? [0, 0, 0]).map((edge) => Math.max(edge, THIN * drone)) as [number, number, number];
+  const stone = new MeshLambertMaterial({ flatShading: true });
+  const body = new Mesh(rigid ? new BoxGeometry(x, y, z) : new IcosahedronGeometry(0.42 * drone, 1), stone);
+  const wanted = rigid
+    ? new LineSegments(new EdgesGeometry(new BoxGeometry(x, y, z)), new LineBasicMaterial())
+    : new Mesh(new TorusGeometry(0.62 * drone, 0.035 * drone, 6, 40), new MeshBasicMaterial());
   object.add(body, wanted);
   return {
     object,
@@ -22,6 +38,11 @@ export const load: Maker = (_flight, { drone }) => {
       body.visible = Number.isFinite(frame.load[0]);
       wanted.position.fromArray(frame.reference);
       wanted.visible = shown.paths && Number.isFinite(frame.reference[0]);
+      if (!rigid) return;
+      const [w, a, b, c] = frame.load_attitude as unknown as [number, number, number, number];
+      body.quaternion.set(a, b, c, w);
+      const [wd, ad, bd, cd] = frame.reference_attitude as unknown as [number, number, number, number];
+      wanted.quaternion.set(ad, bd, cd, wd);
     },
   };
 };

@@ -13,6 +13,7 @@ from colift.kernel.signals import LEGEND
 from colift.record.verdict import limits
 from colift.show.live import protocol
 from colift.show.live.session import Row, Session
+from colift.show.viewer.data import body_of
 
 PER_DRONE = {
     "positions", "attitudes", "directions", "desired_directions",
@@ -43,6 +44,7 @@ def hello(session: Session, role: str) -> str:
             "radii": [
                 float(radius) if math.isfinite(radius) else None for radius in mission.team.radii
             ],
+            "body": body_of(mission),
             "safe_angle_deg": limits(mission).angle_deg,
             "ground": None if mission.ground is None else mission.ground.height,
             "legend": _legend(),

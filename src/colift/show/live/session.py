@@ -451,6 +451,8 @@ def _signals(flight: Flight) -> dict[str, Array]:
         "reference": bus.reference[0].copy(),
         "force": bus.force.copy(),
         "external": bus.external_forces[-1].copy(),
+        "load_attitude": bus.load_attitude.copy(),
+        "reference_attitude": bus.reference_attitude.copy(),
     }
     for name in (
         "positions", "attitudes", "directions", "desired_directions",

@@ -13,6 +13,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from colift.mission.criteria import METRICS
+from colift.mission.schema import Described
 from colift.record.metrics import compute, tracking_error
 from colift.record.moments import angle_pairs
 from colift.record.recording import Recording
@@ -42,6 +43,8 @@ SHOWN = (
     "desired_tensions",
     "thrusts",
     "reeled",
+    "load_attitude",
+    "reference_attitude",
 )
 """Signals of the page that are rows of the recording; ``external`` is the force on the load,
 ``reeled`` only how much cable winches have paid out."""
@@ -91,6 +94,7 @@ def _flight(
         "cable_lengths": mission.team.cable_lengths.tolist(),
         "radii": [_number(radius) for radius in mission.team.radii],
         "ground": None if mission.ground is None else mission.ground.height,
+        "body": body_of(mission),
         "safe_angle_deg": limits(mission).angle_deg,
         "weight": mission.load.mass * mission.world.gravity,
         "thrust": (mission.load.mass + mission.team.masses.sum())
@@ -128,6 +132,14 @@ def _flight(
             **_cycles(recording, rows),
         },
     }
+
+
+def body_of(mission: Described) -> dict[str, Any] | None:
+    """Size (3) of a rigid load and where the cables end on it (n, 3), in its frame, m; None of a point."""
+    body = mission.true_team.body
+    if body is None:
+        return None
+    return {"size": body.size.tolist(), "attachments": body.attachments.tolist()}
 
 
 def _signals(recording: Recording) -> dict[str, Array]:
