@@ -15,13 +15,13 @@ from pages import DOCS, fill, table
 from colift.kernel.math import shares
 
 RESULTS = Path(__file__).with_suffix(".json")
-FIRST_SEED = 1000
+FIRST_SEED = 9000
 SOME = (
     "calm;wind;all, load +50 %;all, load -50 %;cable cut;drone dead, on its cable;one motor dead;"
     "drone's sensors stuck for good"
 )
-MISSION = "real-world-adaptive"
-"""The mission that the page is about."""
+MISSION = "real-world"
+"""The mission that the page is about. Tables that were not flown anew name theirs."""
 CAMPAIGNS = {
     "single": ([], 1),
     "storm": (["--conditions", "* in wind;* in all, load +50 %;* in all, load -50 %"], 4),

@@ -19,12 +19,15 @@ HOVER = {"name": "t", "reference": {"kind": "hover"}, "timing": {"duration": 2.0
 
 
 def warned(changes, source=HOVER):
-    return [str(each) for each in warnings_of(load_mission(source, changes))]
+    """What parts warn of; what loops do is in tests/control/test_margins.py."""
+    found = warnings_of(load_mission(source, changes))
+    loops = ("loop is unstable near", "loop has a modulus margin")
+    return [str(each) for each in found if not any(loop in each.message for loop in loops)]
 
 
 @pytest.mark.parametrize("name", mission_names())
 def test_shipped_missions_warn_of_nothing(name):
-    assert warned({}, name) == []
+    assert warnings_of(load_mission(name)) == []
 
 
 def test_wind_without_drag_acts_on_nothing():

@@ -109,7 +109,7 @@ class Rig:
         rest = self.team.cable_lengths[:, None] / lengths.shape[1]
         stretch = np.maximum(lengths - rest, 0.0)
         stretch[:, -1] *= self.attached  # a cut is at the load's end
-        return 0.5 * np.sum(self.part.stiffness / rest * stretch**2)
+        return 0.5 * np.sum(self.part.tautness(self.team)[:, None] / rest * stretch**2)
 
     def energy(self):
         """Translational, potential and elastic energy, J; that of attitudes is separate."""

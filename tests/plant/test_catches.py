@@ -34,7 +34,8 @@ def plant(kind, **settings):
     part = find("plant", kind)
     if message := part.missing():
         pytest.skip(message)
-    return part(**settings)
+    rope = {"stiffness": 4e4} if kind == "elastic-cables" else {}
+    return part(**rope, **settings)
 
 
 @cache

@@ -181,6 +181,23 @@ def test_beads_converge_as_they_multiply_and_become_massless():
     assert np.all((rates > 7.0) & (rates < 13.0)), errors  # as the density
 
 
+@pytest.mark.parametrize(("load", "EA"), [(0.225, 4e4), (0.0225, 4e3), (22.5, 4e6)])
+def test_elastic_cables_are_as_thick_as_the_load_that_is_told_asks_for(load, EA):
+    mission = colift.load_mission(
+        "hover",
+        {
+            "plant.kind": "elastic-cables", "drones.vehicle": "heavy-lift-25kg", "load.mass": load,
+            "drones.cable_length": 5.0, "truth.load_mass_factor": 1.5,
+        },
+    )  # fmt: skip
+    assert mission.plant.stiffness == pytest.approx(EA, rel=1e-15)
+    assert mission.resolved()["derived"]["plant.stiffness"] == mission.plant.stiffness
+    given = colift.load_mission(
+        "hover", {"plant.kind": "elastic-cables", "plant.stiffness": 123.0, "load.mass": 1.0}
+    )
+    assert given.plant.stiffness == 123.0
+
+
 # ---------------------------------------------------------------- refusals
 
 

@@ -7,6 +7,7 @@ import pytest
 from plant_rig import DOWN, Rig
 
 from colift.errors import MissionError
+from colift.flight.flight import Flight
 from colift.kernel.math.winch import paid_out, turning
 from colift.mission import load_mission
 from colift.team import Team
@@ -54,6 +55,17 @@ def test_a_winch_works_tension_times_rate_and_keeps_angular_momentum(name):
     gained = 0.5 * reduced * turn**2 * (1.0 / end**2 - 1.0)
     assert work == pytest.approx(gained, rel=10 * tolerance)
     assert kinetic(rig) - before == pytest.approx(work, rel=10 * tolerance)
+
+
+def test_a_drone_stands_still_while_its_winch_lets_the_load_down():
+    """The way of the load and that of the cable are alike and as long: ``winch-delivery``, from when it is above the place."""
+    shorter = {"reference.points": [[5.0, 0.0, 5.0], [5.0, 0.0, 1.0]], "timing.duration": 13.0}
+    shorter["events"] = [{"at": 1.0, "field": "drones.cable_length", "value": 5.0, "rate": 0.875}]
+    flown = Flight(load_mission("winch-delivery", shorter)).run()
+    assert np.abs(flown["positions"][:, 0] - [5.0, 0.0, 6.0]).max() < 0.01
+    assert flown["load"][-1, 0] == pytest.approx([5.0, 0.0, 1.0], abs=0.005)
+    apart = np.linalg.norm(flown["positions"][:, 0] - flown["load"][:, 0], axis=1)
+    assert apart == pytest.approx(1.0 + flown["reeled"][:, 0, 0], abs=1e-4)
 
 
 def test_a_slack_cable_that_is_taken_in_comes_taut():

@@ -26,7 +26,7 @@ from colift.mission.mission import Mission
 from colift.mission.schema import Event
 from colift.mission.warnings import warnings_of
 from colift.part import LAYERS, Part, Vector, make
-from colift.record.ends import ends_of
+from colift.record.ends import ends_of, turned_ends
 from colift.record.recording import Recording
 from colift.team import Team, contact
 from colift.team.geometry import matrix_of, min_norm_tensions, widest_gap, zero_yaw_quaternion
@@ -447,18 +447,26 @@ class Flight:
             self._every.recording,
         )
         positions = log[:, where["positions"]].reshape(len(log), team.n, 3)
-        load = log[:, where["load"]].reshape(len(log), 2, 3)
         found = contact.first_contact(
             team.radii,
             team.cable_lengths + log[:, where["reeled"]].reshape(len(log), team.n, 3)[:, :, 0],
             positions,
-            ends_of(load, team.n)[:, :, 0],
+            self._ends(log, team)[:, :, 0],
             log[:, where["attached"]],
         )
         if found is None:
             return None
         row, text = found
         return (-(-first // period) + row) * period, text.format(*leg.drones)
+
+    def _ends(self, log: NDArray[np.float64], team: Team) -> NDArray[np.float64]:
+        """Places and velocities of the cables' ends (rows, n, 2, 3) in rows of the log."""
+        where = columns(team.n)
+        load = log[:, where["load"]].reshape(len(log), 2, 3)
+        if team.body is None:
+            return ends_of(load, team.n)
+        attitude, rates = log[:, where["load_attitude"]], log[:, where["load_rates"]]
+        return turned_ends(load, attitude, rates, team.body.attachments)
 
     def _cut(self, step: int, text: str) -> None:
         """End the flight at a step of the last stretch, whose later rows are dropped."""

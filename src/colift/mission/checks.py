@@ -84,7 +84,9 @@ def cross_checks(
             kind = f"{path}.kind"
             if message := part.missing():
                 yield Problem(kind, "", message)
-            team = _of_plant(frame, part) if isinstance(part, PlantPart) else frame.team
+            team = frame.team
+            if isinstance(part, PlantPart):
+                part, team = part.filled(team), _of_plant(frame, part)
             found = part.check(team)
             if must_fly and not (found or weak):
                 found = part.conflicts(team)
@@ -289,7 +291,9 @@ def _event_checks(
             if not found and not broken & {"world", "load", "drones", "truth"}:
                 plant = present.get("plant")
                 for field, message in (
-                    plant.check(_of_plant(frame, plant, load_mass=float(event.value)))
+                    plant.filled(frame.team).check(
+                        _of_plant(frame, plant, load_mass=float(event.value))
+                    )
                     if isinstance(plant, PlantPart)
                     else ()
                 ):

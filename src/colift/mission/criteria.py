@@ -19,6 +19,9 @@ class Metric(NamedTuple):
 METRICS = (
     Metric("tracking_rms_m", "m", "root mean square of the load's distance from its reference"),
     Metric("tracking_max_m", "m", "largest distance of the load from its reference"),
+    Metric("attitude_rms_deg", "deg", "root mean square of the angle of a rigid load from its wanted attitude"),
+    Metric("attitude_max_deg", "deg", "largest angle of a rigid load from its wanted attitude"),
+    Metric("yaw_max_deg", "deg", "largest part of that angle about the vertical"),
     Metric("min_angle_deg", "deg", "smallest angle between two actual cables at any time"),
     Metric("usual_angle_deg", "deg", "median over time of the smallest angle between two actual cables"),
     Metric("min_desired_angle_deg", "deg", "smallest angle between two wanted cables at any time"),

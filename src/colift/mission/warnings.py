@@ -1,6 +1,7 @@
 """What is likely to go wrong in a mission that is valid: told before it flies.
 
-Each part knows what it needs of the others (:meth:`colift.part.Part.warnings`); nothing is listed here.
+Each part knows what it needs of the others (:meth:`colift.part.Part.warnings`); nothing is listed here. What the parts make
+together, the loops, has its margins in :mod:`colift.mission.stability`.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from colift.errors import Problem
+from colift.mission.stability import margin_warnings
 from colift.part import FOLDERS, LISTS, placed
 
 if TYPE_CHECKING:
@@ -20,8 +22,8 @@ def notes_of(mission: Mission) -> list[Problem]:
 
 
 def warnings_of(mission: Mission) -> list[Problem]:
-    """Everything that the mission's parts warn of, by the path of the field."""
-    found = []
+    """Everything that the mission's parts warn of, by the path of the field; then loops that are hardly stable."""
+    found: list[Problem] = []
     for folder in FOLDERS:
         chosen = getattr(mission, folder)
         named = (
@@ -36,4 +38,5 @@ def warnings_of(mission: Mission) -> list[Problem]:
                 value = getattr(owner, field.rpartition(".")[2], "")
                 shown = f"{value:g}" if isinstance(value, float) else str(value)
                 found.append(Problem(where, shown, message))
+    found += margin_warnings(mission)
     return found

@@ -27,4 +27,23 @@ def cable_ends(recording: Recording) -> Array:
     """
     if "ends" in recording:
         return recording["ends"]
-    return ends_of(recording["load"], recording.n)
+    body = recording.mission.true_team.body
+    if body is None:
+        return ends_of(recording["load"], recording.n)
+    return turned_ends(
+        recording["load"], recording["load_attitude"], recording["load_rates"], body.attachments
+    )
+
+
+def turned_ends(load: Array, attitude: Array, rates: Array, attachments: Array) -> Array:
+    """Of a rigid load: places and velocities (rows, n, 2, 3) of its attachments (n, 3), from its motion (rows, 2, 3), attitude and rates."""
+    w, v = attitude[:, :1, None], attitude[:, None, 1:]
+
+    def turned(vectors: Array) -> Array:
+        across = 2.0 * np.cross(v, vectors)
+        return np.asarray(vectors + w * across + np.cross(v, across))
+
+    rows = np.broadcast_to(attachments, (len(load), *attachments.shape))
+    places = load[:, None, 0] + turned(rows)
+    speeds = load[:, None, 1] + turned(np.cross(rates[:, None], rows))
+    return np.stack([places, speeds], axis=2)

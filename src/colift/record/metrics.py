@@ -126,6 +126,36 @@ def tracking_max_m(r: Recording) -> float:
     return _largest(np.linalg.norm(tracking_error(r), axis=1))
 
 
+def attitude_error(recording: Recording) -> NDArray[np.float64]:
+    """Rotation vectors (rows, 3), rad, world, from the wanted attitude of a rigid load to its own; NaN of a point."""
+    rows = len(recording.time)
+    if recording.mission.load.kind != "rigid":
+        return np.full((rows, 3), np.nan)
+    q, p = recording["load_attitude"], recording["reference_attitude"]
+    w = np.sum(q * p, axis=1)
+    # Imaginary part of q p*.
+    v = q[:, 1:] * p[:, :1] - p[:, 1:] * q[:, :1] - np.cross(q[:, 1:], p[:, 1:])
+    v = np.where(w[:, None] < 0.0, -v, v)
+    size = np.linalg.norm(v, axis=1)
+    angle = 2.0 * np.arctan2(size, np.abs(w))
+    return np.asarray(v * (angle / np.maximum(size, 1e-300))[:, None])
+
+
+@_metric
+def attitude_rms_deg(r: Recording) -> float:
+    return math.degrees(float(np.sqrt(mean(np.sum(attitude_error(r) ** 2, axis=1), r.time))))
+
+
+@_metric
+def attitude_max_deg(r: Recording) -> float:
+    return math.degrees(_largest(np.linalg.norm(attitude_error(r), axis=1)))
+
+
+@_metric
+def yaw_max_deg(r: Recording) -> float:
+    return math.degrees(_largest(np.abs(attitude_error(r)[:, 2])))
+
+
 @_metric
 def min_angle_deg(r: Recording) -> float:
     return _smallest_angle(_uncut(r))

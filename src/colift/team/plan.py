@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from colift.kernel.spans import BODY, LINE, POINT
 from colift.team.bodies import Team
 from colift.team.geometry import Array, matrix_of, ring
 
@@ -20,6 +21,8 @@ LEAN = math.radians(30.0)
 """Angle of cables from the vertical, unless distances ask for more."""
 WIDER = math.radians(1.0)
 """Step in which the ring is widened."""
+FLAT = 1e-6
+"""Of ends that count as in one line or point: their extent across it over that of the load."""
 SPARE = 1.15
 """Distances of the plan, over those that are asked for."""
 FLOOR = 0.05
@@ -182,3 +185,13 @@ def _clearance(arms: Array, lengths: Array, forces: Array, needed: Array, downwa
     needs = needed[i, j]
     ratio = np.linalg.norm(apart[i, j], axis=1)[needs > 0.0] / needs[needs > 0.0]
     return float(ratio.min(initial=math.inf))
+
+
+def spanned(team: Team) -> tuple[float, Array]:
+    """Whether the ends lie in one point, in one line or wider, and the line's unit direction (3,) in the load's frame."""
+    ends = team.levers - team.levers.mean(axis=0)
+    size = max(float(np.linalg.norm(team.levers, axis=1).max()), 1e-9)
+    _, extents, axes = np.linalg.svd(np.vstack([ends, np.zeros((3, 3))]), full_matrices=False)
+    if extents[0] <= FLAT * size:
+        return POINT, np.array([0.0, 0.0, 1.0])
+    return (LINE if extents[1] <= FLAT * size else BODY), axes[0]

@@ -47,4 +47,6 @@ class AgentPart(Part):
     def check(self, team: Team) -> list[tuple[str, str]]:
         if self.memory(team).size % team.n:
             return [("kind", "its memory must be the same for each drone, and nothing beside it")]
+        if self.decides and team.body is not None:
+            return [("kind", "shares forces only, on a load that is a point (load.kind)")]
         return super().check(team)

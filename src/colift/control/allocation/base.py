@@ -86,6 +86,8 @@ INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACT
 INFO_SIZE = 6
 
 
+FOR_BODIES = "safe-wrench or wrench-min-norm"
+"""Allocators for rigid loads, for messages."""
 HOVER_CALLS = 1000
 """Most calls until an allocator is taken to have settled in hover; a plain Python one is asked less often."""
 HOVER_STILL = 1e-7
@@ -119,6 +121,14 @@ class AllocatorPart(Part):
     layer: ClassVar[str] = "allocation"
     spread_setting: ClassVar[tuple[str, tuple[float, ...]] | None] = None
     """Setting that buys separation of the cables with tension, and the values that comparisons sweep."""
+
+    wrenches: ClassVar[bool] = False
+    """Whether it gives a rigid load the wanted moment as well."""
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        if team.body is not None and not self.wrenches:
+            return [("kind", f"shares forces only: a rigid load needs {FOR_BODIES}")]
+        return super().check(team)
 
     def with_any_thrust(self, team: Team) -> Self:
         """The same limits but those that follow from the drones' thrust, and cables as steep as they allow: what needs the least."""
@@ -161,6 +171,10 @@ class AllocatorPart(Part):
     def binding(self, team: Team, actuation: Motors) -> list[str]:
         """Which limits keep the load from being heavier, by name and value, the costliest first."""
         return []
+
+    def turning_lag(self, n: int) -> float | None:
+        """Time constant with which the directions of n cables turn with the force, as a whole, s; None where nobody knows."""
+        return 0.0 if n == 1 else None
 
     def hover(self, team: Team, directions: Array, dt: float) -> Allocation:
         """Its answer to the load's weight once it has settled, from these directions (n, 3); dt in s."""

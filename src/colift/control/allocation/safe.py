@@ -331,7 +331,7 @@ class Safe(AllocatorPart):
         return self
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        return self.wrong_lengths(team.n) or self._crossed(team)
+        return super().check(team) or self._crossed(team)
 
     def asked_angles(self, team: Team) -> tuple[Array, Array]:
         """As :meth:`pair_angles`, with ellipsoids as the spheres within them: what no formation can do without."""
@@ -517,6 +517,9 @@ class Safe(AllocatorPart):
         near = np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(angles)) / self.downwash
         pairs = np.triu_indices(team.n, k=1)
         return bool(np.any(near[pairs] < 0.5 * (sizes[:, None] + sizes[None, :])[pairs]))
+
+    def turning_lag(self, n: int) -> float:
+        return self.turning if n > 1 else 0.0
 
     def params(self, team: Team) -> Vector:
         n = team.n

@@ -21,7 +21,6 @@ from colift.control.allocation.base import (
     AllocatorPart,
     Status,
 )
-from colift.control.allocation.common import wrench
 from colift.control.allocation.limits import elastic, metres
 from colift.control.allocation.limits.cycle import LEVEL as LEAN_MOST
 from colift.control.allocation.limits.cycle import MAX_TURN
@@ -37,12 +36,13 @@ from colift.control.allocation.limits.usual import (
 )
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion
+from colift.kernel.math import quaternion, wrench
 from colift.kernel.math.columns import column
+from colift.kernel.spans import BODY, LINE, POINT
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
-from colift.team.plan import least_lean, plan
+from colift.team.plan import least_lean, plan, spanned
 
 _CONVERGED = int(Status.CONVERGED)
 _ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
@@ -74,6 +74,8 @@ M, COLUMNS = MEMORY.at, MEMORY.spans
 R, V = elastic.R, elastic.V
 WIDTH, PAIR = elastic.WIDTH, elastic.PAIR
 
+TURNING = 3.0
+"""Fastest turn of a cable of 1 m that holds a rigid load, rad/s."""
 PRICES = {"horizontal": 60.0, "vertical": 1000.0, "tip": 200.0, "yaw": 20.0}
 """Of what is missing of a wrench, in shares of the load: yaw gives way first, then horizontal force, roll and pitch, the weight last."""
 ROOM = 1e-3
@@ -494,10 +496,10 @@ def slewed(fx, fy, most, memory):  # type: ignore[no-untyped-def]
 @inline
 def nothing(n, span, ax, ay, az, ends, lost):  # type: ignore[no-untyped-def]
     """Combinations of the wrench's rows that no cable force changes, into ``lost``; their number."""
-    if span == wrench.BODY:
+    if span == BODY:
         return 0
     cx, cy, cz = wrench.middle(n, ends)
-    if span == wrench.LINE:
+    if span == LINE:
         lost[0], lost[1], lost[2] = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
         lost[3], lost[4], lost[5] = ax, ay, az
         return 1
@@ -739,6 +741,7 @@ class SafeWrench(AllocatorPart):
 
     kernel = _allocate
     remembers = MEMORY
+    wrenches = True
     spread_setting = ("cone_deg", (10.0, 20.0, 30.0, 40.0, 50.0))
     per_drone = ("tension_min", "tension_max", "max_thrust", "min_distance", "cable_distance")
     of_all = ("tension_min", "tension_max", "max_rate")
@@ -774,8 +777,8 @@ class SafeWrench(AllocatorPart):
     max_cone_deg: Degrees = 75.0
     """Largest angle between a cable and the vertical, degrees: drones stay above the load."""
     max_rate: Annotated[float, Field(gt=0.0, le=1e3)] | None = None
-    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 0.4 for a cable of 1 m and less as
-    the square root of its length, 1 for teams of one or two; else 6."""
+    """Fastest turn of a cable's direction, rad/s. None: where ``drones.max_thrust`` is known, 3 for a cable of 1 m and less as the
+    square root of its length, as a rigid load is moved by cables that turn; 0.4 on a point, 1 for teams of one or two; else 6."""
     max_thrust: Force | list[Force] | None = None
     """Largest thrust of a drone, N. None: 0.95 of ``drones.max_thrust``, or not limited."""
     max_tilt_deg: Degrees | None = None
@@ -794,7 +797,11 @@ class SafeWrench(AllocatorPart):
         known = np.isfinite(team.max_thrusts)
         share = _share(team)
         lifts = MOST * team.max_thrusts - team.masses * team.gravity
-        turn = RATE / math.sqrt(float(team.cable_lengths.mean())) if team.n > 2 else SWINGING
+        turn = (TURNING if team.body is not None else RATE) / math.sqrt(
+            float(team.cable_lengths.mean())
+        )
+        if team.n <= 2:
+            turn = SWINGING
         return {
             "max_rate": np.where(known.all(), np.full(team.n, turn), math.nan),
             "tension_min": np.where(known, LOW * share, math.nan),
@@ -805,7 +812,7 @@ class SafeWrench(AllocatorPart):
         }
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        if problems := self.wrong_lengths(team.n):
+        if problems := super().check(team):
             return problems
         low, high = self.settled("tension_min", team), self.settled("tension_max", team)
         if np.all(1.2 * low <= high):
@@ -920,14 +927,14 @@ class SafeWrench(AllocatorPart):
     def params(self, team: Team) -> Vector:
         n = team.n
         directions, tensions = self.formation(team)
-        span, axis = wrench.spanned(team)
+        span, axis = spanned(team)
         sigma = max(_share(team), 1e-6)
         size = max(float(np.abs(team.levers).max()), 1e-3)
         most = self.thrust_limits(team)
         flying = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
         caps = self.tension_caps(team)
         sizes, rotors, gap = self.drone_distances(team), self.cable_distances(team), self.gap(team)
-        if span == wrench.POINT:
+        if span == POINT:
             rotors, gap = np.zeros(n), 0.0  # cables that meet come as near as they like
         outs = outward(team)
         level, tip = PRICES["horizontal"], PRICES["tip"]

@@ -178,7 +178,7 @@ class WahbaHoenig(AllocatorPart):
         if self.distance > 1.2 * shortest:
             limit = f"must be at most 1.2 of the shortest cable, {1.2 * shortest:g} m"
             return [("distance", f"{limit}; found {self.distance:g}")]
-        return []
+        return super().check(team)
 
     def tilts(self, team: Team) -> Array:
         """Angle (n,) between either side of a wedge and its middle, rad."""

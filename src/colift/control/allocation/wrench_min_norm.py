@@ -9,16 +9,15 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.allocation.base import INFO_GAP, SIGNATURE, AllocatorPart, Status
-from colift.control.allocation.common import wrench
 from colift.control.allocation.common.share import balance, begin, effort
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion
+from colift.kernel.math import quaternion, wrench
 from colift.kernel.math.columns import column
 from colift.kernel.rounding import NO_TENSION, UNBALANCED
 from colift.part import Vector
 from colift.team import Team
-from colift.team.plan import plan
+from colift.team.plan import plan, spanned
 
 _CONVERGED = int(Status.CONVERGED)
 _ZERO_FORCE = int(Status.ZERO_FORCE)
@@ -92,13 +91,14 @@ class WrenchMinNorm(AllocatorPart):
 
     kernel = _allocate
     remembers = MEMORY
+    wrenches = True
 
     cone_deg: Annotated[float, Field(gt=0.0, lt=80.0)] = 30.0
     """Angle of the formation's cables from the vertical in hover, degrees."""
 
     def params(self, team: Team) -> Vector:
         directions, tensions = plan(team, lean=math.radians(self.cone_deg))
-        span, axis = wrench.spanned(team)
+        span, axis = spanned(team)
         forces = tensions[:, None] * directions / (team.load_mass * max(team.gravity, 1e-3))
         reach = max(float(abs(team.levers).max()), 1e-9)
         return np.concatenate([[span, *axis, reach], forces.ravel(), team.levers.ravel()])

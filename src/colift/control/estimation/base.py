@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from colift.control.margins import Filter
 from colift.kernel.ports import PORTS
 from colift.part import Part
 
@@ -19,3 +20,7 @@ class EstimationPart(Part):
     """Base of all estimators."""
 
     layer: ClassVar[str] = "estimation"
+
+    def filters(self) -> tuple[Filter, Filter] | None:
+        """Of each drone's place and of the load's; None where measurements are believed as they are."""
+        return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic import Field
 
 from colift.control.estimation._cables import load_from_drones
 from colift.control.estimation.base import SIGNATURE, EstimationPart
+from colift.control.margins import Filter
 from colift.control.tuning import lag_warnings, shorter
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
@@ -259,12 +261,20 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if tracked:
         _correct(0, P.load, params, memory)
     ages[n, 0] = 0.0
+    # A rigid load goes on turning as it did when it was seen.
+    q, w, age = sees.measured_load_attitude, sees.measured_load_rates, measured_ages[n, 0]
+    age = min(max(age, 0.0), 0.5)
+    turned = quaternion.turn(q[0], q[1], q[2], q[3], w[0] * age, w[1] * age, w[2] * age)
+    for k in range(4):
+        writes.estimated_load_attitude[k] = turned[k]
     for k in range(3):
+        writes.estimated_load_rates[k] = w[k]
         p, v = _forecast(0, slot, slots, dt, memory, k)
         estimated_load[0, k] = p
         estimated_load[1, k] = v
 
 
+@cache
 def steady_gains(
     period: float, position: float, velocity: float, unexplained: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -344,7 +354,7 @@ class Predictor(EstimationPart):
     load_from: Literal["sensor", "cables"] = "sensor"
     """Where the load is known from: its own tracking as long as there is some, or the drones alone."""
     patience: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
-    """How long the load's sensor may be silent before the drones fill in, s."""
+    """How long the load's sensor may be silent before the drones fill in, s; a rigid load is carried forward instead."""
     coast: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
     """How long a drone is carried forward without any new sample, s; then it is left standing, for a detection to see."""
     steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
@@ -358,8 +368,17 @@ class Predictor(EstimationPart):
         yield from shorter("attitude_delay", self.attitude_delay, "sensing.attitude_delay", real)
         yield from lag_warnings(self.lag, mission)
 
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        if team.body is not None and self.load_from == "cables":
+            return [
+                ("load_from", "takes cables that meet in a point: a rigid load needs its sensor")
+            ]
+        return super().check(team)
+
     def params(self, team: Team) -> Vector:
         patience = self.patience if self.load_from == "sensor" else -1.0
+        if team.body is not None:  # its cables do not meet
+            patience = math.inf
         return PARAMS.pack(
             team.n, delay=self.delay, turn=self.attitude_delay, lag=self.lag, period=self.period,
             patience=patience, smooth=self.attitude_filter, g=team.gravity, m_L=team.load_mass,
@@ -369,6 +388,15 @@ class Predictor(EstimationPart):
             load=self._filter(self.load_position_noise, self.load_velocity_noise),
             drones=self._filter(self.position_noise, self.velocity_noise),
         )  # fmt: skip
+
+    def filters(self) -> tuple[Filter, Filter]:
+        drones, _ = steady_gains(
+            self.period, self.position_noise, self.velocity_noise, self.unexplained
+        )
+        load, _ = steady_gains(
+            self.period, self.load_position_noise, self.load_velocity_noise, self.unexplained
+        )
+        return Filter(drones / self.period, True), Filter(load / self.period, False)
 
     def _filter(self, position: float, velocity: float) -> Vector:
         gain, surprise = steady_gains(self.period, position, velocity, self.unexplained)

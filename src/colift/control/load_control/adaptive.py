@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
+from colift.control.margins import Hanging
 from colift.control.tuning import LEAN, Delays
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
@@ -78,6 +79,7 @@ class Adaptive(LoadControlPart, Delays):
 
     kernel = _adaptive
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "delay"
 
     learning: Annotated[float, Field(gt=0.0, le=2.0)] = 0.3
     """Rate at which the mass is learned over the bandwidth of the drones' position loops."""
@@ -92,6 +94,13 @@ class Adaptive(LoadControlPart, Delays):
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "load_control")
+
+    def hanging(self, team: Team, axis: int) -> Hanging:
+        band = self.bandwidths(team)
+        k_p = LEAN * team.load_mass * team.gravity / float(team.cable_lengths.mean())
+        stiffness = float(team.masses.sum()) * band.velocity * band.position + k_p
+        k_i = stiffness * self.leaning * band.position
+        return Hanging(k_p, 0.5 * k_p / band.position, k_i)
 
     def params(self, team: Team) -> Vector:
         band = self.bandwidths(team)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
+from colift.control.margins import Hanging
 from colift.control.tuning import Delays, sway
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
@@ -53,6 +54,7 @@ class Balance(LoadControlPart, Delays):
 
     kernel = _balance
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "rate"
 
     rate: Annotated[float, Field(gt=0.0, le=5.0)] = 0.45
     """How fast the observed force is followed, over the bandwidth of the velocity loop."""
@@ -64,12 +66,15 @@ class Balance(LoadControlPart, Delays):
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "load_control")
 
-    def params(self, team: Team) -> Vector:
+    def hanging(self, team: Team, axis: int) -> Hanging:
         rate = min(self.rate * self.bandwidths(team).velocity, sway(team))
         if team.n <= 2:
             wp = math.sqrt(max(team.gravity, 1e-3) / float(team.cable_lengths.mean()))
             rate = min(rate, self.swing * wp)
+        return Hanging(rate=rate)
+
+    def params(self, team: Team) -> Vector:
         return PARAMS.pack(
-            team.n, m=team.load_mass, g=team.gravity, rate=rate,
+            team.n, m=team.load_mass, g=team.gravity, rate=self.hanging(team, 0).rate,
             tangent=math.tan(math.radians(self.max_lean_deg)),
         )  # fmt: skip

@@ -7,3 +7,5 @@ from colift.part import driven
 @driven
 class External(LoadControlPart):
     """What the layer writes is set by :meth:`colift.flight.flight.Flight.act`."""
+
+    turns = True

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
+from colift.control.margins import Hanging
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.part import Vector
@@ -57,6 +58,7 @@ class Pid(LoadControlPart):
 
     kernel = _pid
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "k_p"
 
     k_p: tuple[Gain, Gain, Gain] = (8.0, 8.0, 8.0)
     """Proportional gain per world axis, N/m (paper: 8)."""
@@ -70,6 +72,9 @@ class Pid(LoadControlPart):
     """Share of the wanted acceleration that is fed forward; 1 in the paper."""
     sign: Literal["corrected", "as-printed"] = "corrected"
     """Sign of the feed-forward term."""
+
+    def hanging(self, team: Team, axis: int) -> Hanging:
+        return Hanging(self.k_p[axis], self.k_d[axis], self.k_i[axis])
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(

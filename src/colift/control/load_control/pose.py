@@ -117,6 +117,7 @@ class Pose(LoadControlPart, Delays):
 
     kernel = _pose
     remembers = MEMORY
+    turns = True
 
     place: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     """Natural frequency of the feedback of the place, rad/s; critically damped."""

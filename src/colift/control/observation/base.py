@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from colift.kernel.ports import PORTS
 from colift.part import Part
+from colift.team import Team
 
 SIGNATURE = PORTS["observation"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
@@ -20,3 +21,11 @@ class ObservationPart(Part):
     layer: ClassVar[str] = "observation"
     senses: ClassVar[tuple[str, ...]] = ("tracking",)
     """The sensors (:data:`colift.world.sensing.base.SENSORS`) whose delay it suffers."""
+
+    def watching(self, team: Team) -> tuple[float, float]:
+        """Bandwidths of the observers of the whole momentum and of each drone's own, 1/s; 0 for none."""
+        return 0.0, 0.0
+
+    def axis_delay(self) -> float:
+        """Delay over which the axis of the thrust that is known is carried forward, s."""
+        return 0.0

@@ -291,6 +291,13 @@ class Momentum(ObservationPart, Delays):
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
 
+    def watching(self, team: Team) -> tuple[float, float]:
+        velocity = self.bandwidths(team).velocity
+        return self.total * velocity, self.own * velocity
+
+    def axis_delay(self) -> float:
+        return self.delay if self.predicted else 0.0
+
     def params(self, team: Team) -> Vector:
         velocity = self.bandwidths(team).velocity
         return PARAMS.pack(

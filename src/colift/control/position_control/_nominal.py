@@ -1,7 +1,7 @@
 """Nominal pulls of the cables of a rigid load, where its reference plans none: what its wanted motion asks of them, with two derivatives.
 
 The wanted pose and its derivatives ask for a force ``F`` and a moment ``M``; the plan of the formation, turned to them, and
-the nearest forces that make them exactly are what an allocator answers that nothing limits (:mod:`colift.control.allocation.common.wrench`). As they are free
+the nearest forces that make them exactly are what an allocator answers that nothing limits (:mod:`colift.kernel.math.wrench`). As they are free
 of noise, their derivatives are differences. So what a load is wanted to do passes to the drones without the lag of the filter
 that corrections go through.
 """
@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from colift.control.allocation.common import wrench
 from colift.kernel.jit import aside
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion
+from colift.kernel.math import quaternion, wrench
 from colift.kernel.math.small import cross, matrix_times
 from colift.part import Vector
 from colift.team import Team
-from colift.team.plan import plan
+from colift.team.plan import plan, spanned
 
 NUMBERS = Layout(team={"m": 1, "g": 1, "kind": 1, "axis": 3, "J": 9, "centre": 3})
 """Parameters, behind which plan and levers of all cables follow (3 n each); ``kind`` and ``axis`` of the wrenches that they can make."""
@@ -31,7 +30,7 @@ def numbers(team: Team) -> Vector:
     if team.body is None:
         return np.zeros(0)
     directions, tensions = plan(team)
-    kind, axis = wrench.spanned(team)
+    kind, axis = spanned(team)
     share = tensions[:, None] * directions / (team.load_mass * max(team.gravity, 1e-3))
     own = NUMBERS.pack(
         team.n, m=team.load_mass, g=team.gravity, kind=kind, axis=axis, J=team.body.inertia.ravel(),

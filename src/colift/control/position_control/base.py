@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from colift.control.margins import Places
 from colift.kernel.ports import PORTS
 from colift.part import Part
+from colift.team import Team
 
 SIGNATURE = PORTS["position_control"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
@@ -20,3 +22,13 @@ class PositionControlPart(Part):
     layer: ClassVar[str] = "position_control"
     senses: ClassVar[tuple[str, ...]] = ("tracking",)
     """The sensors (:data:`colift.world.sensing.base.SENSORS`) whose delay it suffers."""
+    gain_setting: ClassVar[str] = "kind"
+    """Setting to change where the loop is near instability, for messages."""
+
+    def places(self, team: Team, axis: int) -> Places | None:
+        """The law for small errors along a horizontal axis of the world, 0 or 1; None where there is no such law."""
+        return None
+
+    def axis_delay(self) -> float:
+        """Delay over which the axis of the thrust that is known is carried forward, s."""
+        return 0.0

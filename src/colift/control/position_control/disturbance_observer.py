@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from colift.control.margins import Places
 from colift.control.position_control._aim import AIM, aim, limit
 from colift.control.position_control._cable import CABLE, lead
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
@@ -170,6 +171,7 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     kernel = _observe_and_control
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "delay"
 
     observer: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     """Bandwidth of the observer over that of the position loop."""
@@ -192,6 +194,16 @@ class DisturbanceObserver(PositionControlPart, Delays):
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
+
+    def places(self, team: Team, axis: int) -> Places:
+        band = self.bandwidths(team)
+        return Places(
+            band.velocity, band.velocity * band.position, lead=self.frequency,
+            thrust_filter=self.thrust_filter, observer=self.observer * band.position,
+        )  # fmt: skip
+
+    def axis_delay(self) -> float:
+        return self.delay if self.predicted else 0.0
 
     def params(self, team: Team) -> Vector:
         band = self.bandwidths(team)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from colift.control.margins import Places
 from colift.control.position_control._aim import AIM, aim
 from colift.control.position_control._cable import CABLE, lead
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
@@ -74,6 +75,7 @@ class FeedForward(PositionControlPart):
 
     kernel = _feed_forward
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "k_d"
 
     k_p: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
     """Proportional gain per world axis, N/m."""
@@ -87,6 +89,11 @@ class FeedForward(PositionControlPart):
     """Natural frequency of the reference filter on the sphere, rad/s."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=0.1)] = 0.003
     """Time constant of the derivative of the thrust direction, s."""
+
+    def places(self, team: Team, axis: int) -> Places:
+        m = float(team.masses.mean())
+        k_p, k_d, k_i = self.k_p[axis] / m, self.k_d[axis] / m, self.k_i[axis] / m
+        return Places(k_d, k_p, k_i, lead=self.frequency, thrust_filter=self.thrust_filter)
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(

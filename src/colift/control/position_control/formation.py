@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from colift.control.margins import Places
 from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
 from colift.control.position_control._cable import (
     CABLE,
@@ -189,6 +190,7 @@ class Formation(PositionControlPart, Delays):
 
     kernel = _hold_formation
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "gain"
 
     per_drone = ("max_thrust", "rotor_drag")
     of_all = ("max_thrust",)
@@ -200,7 +202,7 @@ class Formation(PositionControlPart, Delays):
     """Gain of the position error over the square of that of the velocity error."""
     frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.55
     """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
-    rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 1.5
+    rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.12
     """The same for cables that hold a rigid load."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
@@ -226,6 +228,18 @@ class Formation(PositionControlPart, Delays):
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
+
+    def places(self, team: Team, axis: int) -> Places:
+        band = self.bandwidths(team).velocity
+        k1, k3, k4 = self.gain * band, 0.0, 0.0
+        k2 = self.stiffness * k1 * k1
+        if team.n <= 2:
+            height = float(team.cable_lengths.mean())
+            k1, k2, k3, k4 = pendulum_gains(team.gravity, height, band)
+        return Places(
+            k1, k2, lead=self.answers(team), thrust_filter=self.thrust_filter / band,
+            swing=(k3, k4), follows=True,
+        )  # fmt: skip
 
     def answers(self, team: Team) -> float:
         """Natural frequency of the filter of cable directions, rad/s."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from colift.control.margins import Places
 from colift.control.position_control._aim import AIM, aim
 from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.kernel.jit import kernel
@@ -75,6 +76,7 @@ class Pid(PositionControlPart):
 
     kernel = _pid
     remembers = MEMORY
+    gain_setting: ClassVar[str] = "k_d"
 
     k_p: tuple[Gain, Gain, Gain] = (40.0, 40.0, 40.0)
     """Proportional gain per world axis, N/m (paper: 40)."""
@@ -92,6 +94,12 @@ class Pid(PositionControlPart):
     """Time constant of the derivative of the thrust direction, s (unpublished; chosen)."""
     direction_rates: bool = True
     """Include the wanted cable directions' rates in the drones' wanted velocities."""
+
+    def places(self, team: Team, axis: int) -> Places:
+        m = float(team.masses.mean())
+        k_p, k_d, k_i = self.k_p[axis] / m, self.k_d[axis] / m, self.k_i[axis] / m
+        rate = self.direction_filter if self.direction_rates else math.nan
+        return Places(k_d, k_p, k_i, rate_filter=rate, thrust_filter=self.thrust_filter)
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(

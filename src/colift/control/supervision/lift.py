@@ -199,6 +199,13 @@ class Lift(SupervisionPart, Delays):
     ground: Annotated[float, Field(ge=-1e6, le=1e6)] = 0.0
     """Height of the load when it is set down, m, for a flight that begins in the air; otherwise where it stood."""
 
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        if team.body is not None:
+            return [
+                ("kind", "lifts a load that is a point (load.kind); a rigid one starts in the air")
+            ]
+        return super().check(team)
+
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
         rounds = len(self.set_down) if isinstance(self.set_down, list) else 1

@@ -61,6 +61,7 @@ from colift.world.plant._params import P
 from colift.world.plant.base import STEP_SIGNATURE, Start
 
 BEAD = 6
+STIFFEST = 1e9
 CABLES = Layout(drone={"stiffness": 1, "damping": 1, "together": 1, "bead_mass": 1, "drag": 1})
 """Parameters of each cable, after those of the bodies: stiffness of a segment, its damping by its own rate and (``together``)
 by the mean rate of its cable's segments."""
@@ -317,15 +318,22 @@ def level_arc(
     return np.asarray(0.5 * (a + b) + radius * np.sin(angle) * ahead + bow * side)
 
 
+ROPE = 4e4
+"""EA of braided Dyneema of 1 mm, N: about."""
+Stiffness = Annotated[float, Field(gt=0.0, le=STIFFEST)]
+
+
 class ChainPart(BodiesPart):
     """Base of the plants with springs for cables."""
 
     kernel = _step
 
-    stiffness: Annotated[float, Field(gt=0.0, le=1e9)] = 4e4
-    """EA of the cables, force per relative stretch, N (braided Dyneema of 1 mm: about 4e4)."""
     damping_ratio: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     """Of drone and load bouncing on one cable."""
+
+    def tautness(self, team: Team) -> Vector:
+        """EA of each cable (n,), force per relative stretch, N."""
+        raise NotImplementedError
 
     @property
     def bead_count(self) -> int:
@@ -357,9 +365,10 @@ class ChainPart(BodiesPart):
             masses=team.masses + 0.5 * share,
             body=team.body and team.body.with_masses(team.load_mass, 0.5 * share),
         )
-        stiffness = self.stiffness * (k + 1) / team.cable_lengths
+        EA = self.tautness(team)
+        stiffness = EA * (k + 1) / team.cable_lengths
         yields = _yields(team)
-        bounce = np.sqrt(self.stiffness / team.cable_lengths * (1.0 / team.masses + yields))
+        bounce = np.sqrt(EA / team.cable_lengths * (1.0 / team.masses + yields))
         delay = 2.0 * self.damping_ratio / bounce
         # Gershgorin: squared rate of a segment's mode, by the segments that share its two ends.
         ends = np.array([n * _yields(loaded) + 1.0 / loaded.masses])
@@ -384,7 +393,7 @@ class ChainPart(BodiesPart):
         return np.zeros(4 * size + SCRATCH.size(team.n) + contact_size(team.n))
 
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(team.cable_lengths * (1.0 + tensions / self.stiffness))
+        return np.asarray(team.cable_lengths * (1.0 + tensions / self.tautness(team)))
 
     def initial(self, team: Team, start: Start) -> NDArray[np.float64]:
         """Straight cables, as long as the tensions that hold the load make them; slack ones lie in a level arc."""
@@ -419,7 +428,7 @@ class ChainPart(BodiesPart):
         longest = self._cables(team)[2]
         if longest >= SHORTEST:
             return []
-        allowed = self.stiffness * (longest / SHORTEST) ** 2
+        allowed = float(self.tautness(team).max()) * (longest / SHORTEST) ** 2
         return [
             (
                 "stiffness",

@@ -9,9 +9,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
-from colift.world.plant._chain import ChainPart
+from colift.part import Vector
+from colift.team import Team
+from colift.world.plant._chain import ROPE, ChainPart, Stiffness
 
 AIR = 1.225
 """Density of air, kg/m^3."""
@@ -27,6 +30,8 @@ class BeadCables(ChainPart):
         "which its drones do not have"
     )
 
+    stiffness: Stiffness = ROPE
+    """EA of the cables, force per relative stretch, N (braided Dyneema of 1 mm: about 4e4)."""
     beads: Annotated[int, Field(ge=1, le=64)] = 3
     """Beads per cable."""
     density: Annotated[float, Field(gt=0.0, le=10.0)] = 6.5e-4
@@ -37,6 +42,9 @@ class BeadCables(ChainPart):
     """Of the cables across the air; 0 for none."""
     air_velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
     """Velocity of the air around the cables, world, m/s."""
+
+    def tautness(self, team: Team) -> Vector:
+        return np.full(team.n, self.stiffness)
 
     @property
     def bead_count(self) -> int:

@@ -2,8 +2,31 @@
 
 from __future__ import annotations
 
-from colift.world.plant._chain import ChainPart
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from colift.part import Vector
+from colift.team import Team
+from colift.world.plant._chain import ROPE, STIFFEST, ChainPart, Stiffness
+
+CARRIED = 0.225
+"""Load that a rope of 1 mm is taken for, kg: the paper's. Held by one such rope, it stretches it by 0.055 per mille."""
 
 
 class ElasticCables(ChainPart):
     """Massless cables that stretch, with damping, and do not push."""
+
+    from_team: ClassVar[Mapping[str, float | None]] = {"stiffness": None}
+
+    stiffness: Stiffness | None = None
+    """EA of the cables, force per relative stretch, N. None: that of a rope as thick as the load asks for, 4e4 (braided Dyneema of
+    1 mm) for the paper's 0.225 kg and in proportion for others."""
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        EA = min(ROPE * (team.load_mass / CARRIED), STIFFEST)
+        return {"stiffness": np.full(team.n, EA)}
+
+    def tautness(self, team: Team) -> Vector:
+        return self.settled("stiffness", team)

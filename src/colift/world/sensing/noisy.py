@@ -23,14 +23,14 @@ Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Period = Annotated[float, Field(ge=1e-5, le=1.0)]
 
 _WIDTHS = {
-    "load": 6,
+    "load": 13,
     "tracking": 6,
     "attitude": 4,
     "rates": 3,
     "specific_force": 3,
 }  # numbers in one sample, before its step
 _QUANTITIES = (
-    "load_position", "load_velocity", "position", "velocity", "attitude", "rates", "specific_force",
+    "load_position", "load_velocity", "load_attitude", "load_rates", "position", "velocity", "attitude", "rates", "specific_force",
 )  # fmt: skip
 _CHANNELS = 16  # of random numbers per body: 0-6 and 11-12 the noise, two axes in each; 7-10 and 13 dropouts
 _TURNING, _SPINNING = 3, 5  # the first of attitude and rates; tracking has 0-2
@@ -50,7 +50,7 @@ PARAMS = Layout(
 )  # fmt: skip
 """``first_row`` and ``row``: begin and length of the drones' rows in memory."""
 MEMORY = Layout(
-    team={"load_started": 1, "load_bias": 6, "load_samples": None},
+    team={"load_started": 1, "load_bias": 6, "load_turn_bias": 6, "load_samples": None},
     drone={
         "started": 1, "bias": 15, "before": 3, "felt": 3, "steps": 1, "tracking_samples": None,
         "attitude_samples": None, "rates_samples": None, "specific_force_samples": None,
@@ -112,6 +112,15 @@ def _draw_biases(memory, o, width, key, channel, params, quantity):  # type: ign
     _disturb(memory, o, width, key, -1, channel, params, quantity + Q.spread)
 
 
+@inline
+def _turn(w, a, b, c, x, y, z):  # type: ignore[no-untyped-def]
+    """The attitude ``(w, a, b, c)`` turned by a rotation vector (rad) about the axes of the body."""
+    x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+    angle = math.sqrt(x * x + y * y + z * z)
+    sine = math.sin(angle) / angle if angle > 0.0 else 1.0
+    return quaternion.multiply(w, a, b, c, math.cos(angle), sine * x, sine * y, sine * z)
+
+
 @kernel(SIGNATURE, counted=False)
 def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, key, dt = now.step, now.key, now.dt
@@ -127,18 +136,32 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if fresh:
         memory[M.load_started] = 1.0
         _draw_biases(memory, M.load_bias, 6, key, 0, params, P.load_position_error)
-    at, number = _place(fresh, step, dt, key, _LOAD_LOST, params, P.load_sensor, memory, 0, 6)
+        _draw_biases(memory, M.load_turn_bias, 6, key, _TURNING, params, P.load_attitude_error)
+    at, number = _place(fresh, step, dt, key, _LOAD_LOST, params, P.load_sensor, memory, 0, 13)
     if at >= 0:
         for k in range(3):
             memory[at + k] = load[0, k] + memory[M.load_bias + k]
             memory[at + 3 + k] = load[1, k] + memory[M.load_bias + 3 + k]
         _disturb(memory, at, 6, key, number, 0, params, P.load_position_error + Q.noise)
-    at = _arrived(step, params, P.load_sensor, memory, 0, 6)
+        for k in range(3):
+            memory[at + 6 + k] = memory[M.load_turn_bias + k]
+            memory[at + 10 + k] = sees.load_rates[k] + memory[M.load_turn_bias + 3 + k]
+        sizes = P.load_attitude_error + Q.noise
+        _disturb(memory, at + 6, 3, key, number, _TURNING, params, sizes)
+        _disturb(memory, at + 10, 3, key, number, _SPINNING, params, sizes + _NEXT)
+        q = sees.load_attitude
+        turned = _turn(q[0], q[1], q[2], q[3], memory[at + 6], memory[at + 7], memory[at + 8])
+        for k in range(4):
+            memory[at + 6 + k] = turned[k]
+    at = _arrived(step, params, P.load_sensor, memory, 0, 13)
     if at >= 0 and stuck[n] == 0.0:
         for k in range(3):
             measured_load[0, k] = memory[at + k]
             measured_load[1, k] = memory[at + 3 + k]
-        ages[n, 0] = (step - memory[at + 6]) * dt
+            writes.measured_load_rates[k] = memory[at + 10 + k]
+        for k in range(4):
+            writes.measured_load_attitude[k] = memory[at + 6 + k]
+        ages[n, 0] = (step - memory[at + 13]) * dt
     else:
         ages[n, 0] += dt
 
@@ -180,12 +203,9 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             _disturb(
                 memory, at, 3, key, number, channel + _TURNING, params, P.attitude_error + Q.noise
             )
-            x, y, z = 0.5 * memory[at], 0.5 * memory[at + 1], 0.5 * memory[at + 2]
-            angle = math.sqrt(x * x + y * y + z * z)
-            sine = math.sin(angle) / angle if angle > 0.0 else 1.0
-            turned = quaternion.multiply(
+            turned = _turn(
                 attitudes[i, 0], attitudes[i, 1], attitudes[i, 2], attitudes[i, 3],
-                math.cos(angle), sine * x, sine * y, sine * z,
+                memory[at], memory[at + 1], memory[at + 2],
             )  # fmt: skip
             for k in range(4):
                 memory[at + k] = turned[k]
@@ -272,10 +292,18 @@ class Noisy(SensingPart):
     """rad/s."""
     specific_force_noise: Size = 0.2
     """Of a sample, m/s^2."""
+    load_attitude_noise_deg: Degrees = 0.2
+    """Of a rigid load, degrees."""
+    load_rates_noise: Size = 0.02
+    """Of a rigid load, rad/s."""
     load_position_bias: Bias = 0.0
     """World frame, m."""
     load_velocity_bias: Bias = 0.0
     """World frame, m/s."""
+    load_attitude_bias: Bias = 0.0
+    """Of a rigid load, its frame, rad."""
+    load_rates_bias: Bias = 0.0
+    """Of a rigid load, its frame, rad/s."""
     position_bias: Bias = 0.0
     """World frame, m."""
     velocity_bias: Bias = 0.0
@@ -336,8 +364,8 @@ class Noisy(SensingPart):
         for quantity in _QUANTITIES:
             bias = getattr(self, f"{quantity}_bias")
             spread, fixed = (0.0, bias) if isinstance(bias, tuple) else (bias, (0.0, 0.0, 0.0))
-            if quantity == "attitude":
-                size = math.radians(self.attitude_noise_deg)
+            if quantity.endswith("attitude"):
+                size = math.radians(getattr(self, f"{quantity}_noise_deg"))
             else:
                 size = getattr(self, f"{quantity}_noise")
             packed[f"{quantity}_error"] = QUANTITY.pack(0, noise=size, spread=spread, bias=fixed)

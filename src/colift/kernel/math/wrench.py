@@ -10,28 +10,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from colift.kernel.jit import inline
 from colift.kernel.math import quaternion
 from colift.kernel.math.small import solve_symmetric
-from colift.team import Team
-from colift.team.geometry import Array
-
-POINT, LINE, BODY = 0.0, 1.0, 2.0
-"""Where the ends lie: what moments they can make."""
-FLAT = 1e-6
-"""Of ends that count as in one line or point: their extent across it over that of the load."""
-
-
-def spanned(team: Team) -> tuple[float, Array]:
-    """Whether the ends lie in one point, in one line or wider, and the line's unit direction (3,) in the load's frame."""
-    ends = team.levers - team.levers.mean(axis=0)
-    size = max(float(np.linalg.norm(team.levers, axis=1).max()), 1e-9)
-    _, extents, axes = np.linalg.svd(np.vstack([ends, np.zeros((3, 3))]), full_matrices=False)
-    if extents[0] <= FLAT * size:
-        return POINT, np.array([0.0, 0.0, 1.0])
-    return (LINE if extents[1] <= FLAT * size else BODY), axes[0]
+from colift.kernel.spans import BODY, LINE, POINT
 
 
 @inline
