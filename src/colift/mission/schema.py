@@ -180,9 +180,13 @@ class Load(Section):
         """What a point does not have, what a rigid load must have, and inertias that no body has."""
         own = sorted({*type(self).model_fields} - {"kind", "mass"})
         if self.kind == "point":
-            given = [name for name in own if name in self.model_fields_set]
+            given = {name: getattr(self, name) for name in own}
             message = 'is of a rigid load: give load.kind = "rigid" too'
-            return [(name, "", message) for name in given if getattr(self, name) is not None]
+            return [
+                (name, str(value), message)
+                for name, value in given.items()
+                if value is not None and np.any(value)
+            ]
         if self.size is None:
             return [("size", "", "is required of a rigid load: the edges of the box around it, m")]
         if self.inertia is None:

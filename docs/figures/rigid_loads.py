@@ -1,0 +1,95 @@
+"""How boxes fly: ``python docs/figures/rigid_loads.py`` writes the table of docs/rigid-loads.md, with ``--fly`` flown anew first."""
+
+import math
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+from pages import fill, stored, table
+
+from colift.flight.flight import Flight
+from colift.mission import load_mission
+from colift.record import metrics
+
+SEEDS = range(71_000, 71_010)
+SLOW = dict.fromkeys(("load_control", "allocation", "position_control", "attitude_control"), 0.01)
+CASES = {
+    "ideal motors": {"actuation.kind": "ideal"},
+    "motors with lag and limits": {},
+    "the same on elastic cables": {"plant.kind": "elastic-cables"},
+    "the same in MuJoCo": {"plant.kind": "mujoco"},
+    "noise, 20 ms of delay, 100 Hz": {},
+    "the same, attachments 1 cm wrong": {},
+}
+NOISY = ("noise, 20 ms of delay, 100 Hz", "the same, attachments 1 cm wrong")
+LATE = 6.0
+"""From when on errors count, s: when the eight has come up to speed."""
+
+
+def mission_of(name, n, seed):
+    """The shipped mission under the conditions of a case."""
+    overrides = {"drones.count": n, "seed": seed, **CASES[name]}
+    if name in NOISY:
+        overrides["sensing.kind"] = "noisy"
+        overrides |= {f"timing.{layer}": period for layer, period in SLOW.items()}
+        overrides["timing.delay"] = 0.02
+    if name == NOISY[1]:
+        rng = np.random.default_rng(seed)
+        away = rng.normal(size=(n, 3))
+        away *= 0.01 / np.linalg.norm(away, axis=1, keepdims=True)
+        overrides["truth.attachment_offset"] = away.tolist()
+    return load_mission("box-figure-eight", overrides)
+
+
+def fly(job):
+    """Errors of place (cm) and attitude (degrees): root mean square and largest."""
+    name, n, seed = job
+    recording = Flight(mission_of(name, n, seed)).run()
+    late = recording.time >= LATE
+    place = 100.0 * np.linalg.norm(metrics.tracking_error(recording)[late], axis=1)
+    turn = np.degrees(np.linalg.norm(metrics.attitude_error(recording)[late], axis=1))
+    sizes = [float(f(each)) for each in (place, turn) for f in (_rms, np.max)]
+    return {"case": name, "n": n, "seed": seed, "sizes": sizes, "outcome": recording.outcome}
+
+
+def _rms(values):
+    return math.sqrt(float(np.mean(values**2)))
+
+
+def measure():
+    """All cases; those with noise with each seed."""
+    jobs = [
+        (name, n, seed)
+        for name in CASES
+        for n in (3, 4, 6)
+        for seed in (SEEDS if name in NOISY else SEEDS[:1])
+    ]
+    with ProcessPoolExecutor(2) as pool:
+        return list(pool.map(fly, jobs))
+
+
+def main():
+    flown = stored(__file__, measure)
+    rows = []
+    for name in CASES:
+        for n in sorted({each["n"] for each in flown}):
+            found = [each for each in flown if each["case"] == name and each["n"] == n]
+            worst = np.max([each["sizes"] for each in found], axis=0)
+            whole = sum(each["outcome"] == "completed" for each in found)
+            rows.append(
+                [name, f"{n}", f"{whole}/{len(found)}", f"{worst[0]:.2f}", f"{worst[1]:.2f}"]
+                + [f"{worst[2]:.2f}", f"{worst[3]:.2f}"]
+            )
+    header = [
+        "conditions",
+        "drones",
+        "flown to the end",
+        "RMS, cm",
+        "most, cm",
+        "RMS, deg",
+        "most, deg",
+    ]
+    fill("rigid-loads.md", "flown", table(header, rows))
+
+
+if __name__ == "__main__":
+    main()
