@@ -23,6 +23,7 @@ from colift.kernel.math import winch
 from colift.kernel.ports import PORTS, hold, hold_answer
 from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
+from colift.mission.planned import planned_directions
 from colift.mission.schema import Event
 from colift.mission.warnings import warnings_of
 from colift.part import LAYERS, Part, Vector, make
@@ -633,7 +634,9 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
     directions = mission.start_directions()
     first = mission.reference.sample(np.zeros(1), team)[0]
     weight = [0.0, 0.0, team.load_mass * team.gravity]
-    attitude = mission.reference.attitude(team)
+    _, attitude, _ = mission.reference.pose(team)
+    if team.body is not None and mission.start.directions is None and team.gravity > 0.0:
+        directions = planned_directions(team, mission.reference)
     levers = team.levers @ matrix_of(attitude).T
     tensions = np.maximum(min_norm_tensions(directions, weight, levers), 0.0)
     thrust = team.hover_forces(tensions, directions)

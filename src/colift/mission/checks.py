@@ -64,6 +64,10 @@ def cross_checks(
         for field, value, message in frame.truth.wrong_lengths(n):
             broken.add("truth")
             yield Problem(f"truth.{field}", value, message)
+        ends = frame.load.attachments
+        if ends is not None and len(ends) != n:
+            broken.add("load")
+            yield Problem("load.attachments", f"{len(ends)} points", f"must be drones.count = {n}")
         given = frame.start.directions
         if given is not None and len(given) != n:
             message = f"must be drones.count = {n}"

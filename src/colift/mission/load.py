@@ -17,6 +17,7 @@ from colift.catalogue import FOLDERS, LAYERS, LISTS, default_kind, read_source
 from colift.errors import MissionError, Problem, SettingError, UnknownNameError
 from colift.mission.checks import cross_checks, hover_checks
 from colift.mission.mission import Mission
+from colift.mission.planned import planned_checks
 from colift.mission.schema import Frame
 from colift.part import KIND, Declaration, Declared, Part, find, names
 from colift.team.vehicles import NUMBERS
@@ -257,6 +258,7 @@ def _validate(table: dict[str, Any], problems: list[Problem], must_fly: bool) ->
     problems.extend(cross_checks(frame, parts, lists, broken, must_fly=must_fly))
     if must_fly and not problems:
         problems.extend(hover_checks(frame, parts, lists["disturbance"]))
+        problems.extend(planned_checks(frame, parts))
     if problems:
         return None
     team = frame.team

@@ -153,8 +153,8 @@ class Load(Section):
     """With which the load touches the ground, m; left out: the corners of its box."""
 
     def body(self, n: int) -> Body | None:
-        """The rigid load on n cables; None for a point."""
-        if self.kind == "point":
+        """The rigid load on n cables; None for a point, and for what is none (:meth:`problems`)."""
+        if self.kind == "point" or self.problems() or len(self.attachments or range(n)) != n:
             return None
         assert self.size is not None
         size = np.array(self.size)

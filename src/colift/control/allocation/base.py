@@ -82,6 +82,14 @@ def _ask(  # type: ignore[no-untyped-def]
     return ask(address, force, reference, beside, dt, params, memory, tensions, directions, info)
 
 
+def _ask_plainly(  # type: ignore[no-untyped-def]
+    address, force, reference, moment, attitude, rates, load_attitude, nominal, *rest
+):  # fmt: skip
+    """The same for a kernel in plain Python."""
+    beside = Beside(moment, attitude, rates, load_attitude, nominal)
+    return getattr(ask, "py_func", ask)(address, force, reference, beside, *rest)
+
+
 INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
 INFO_SIZE = 6
 
@@ -306,7 +314,7 @@ class Allocator:
             raise SettingError([Problem(name, "", message) for name, message in problems])
         kernel = type(part).kernel  # through the class: no binding as a method
         self._function = address_of(kernel)
-        self._ask = _ask if self._function is not kernel else getattr(_ask, "py_func", _ask)
+        self._ask = _ask if self._function is not kernel else _ask_plainly
         self._force, self._moment = np.zeros(3), np.zeros(3)
         self._reference, self._rates = np.zeros((4, 3)), np.zeros((3, 3))
         self._wanted, self._attitude = np.array(LEVEL), np.array(LEVEL)

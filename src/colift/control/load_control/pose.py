@@ -74,7 +74,7 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     for k in range(3):
         S = M.moment + k
         if not stands:
-            memory[S] -= now.dt * params[P.k_I] * turn[k]
+            memory[S] -= now.dt * params[P.k_I] * e_R[k]
         memory[S] = min(max(memory[S], -params[P.most]), params[P.most])
         moment[k] = gyration[k] + ahead[k] - params[P.k_R] * turn[k] - params[P.k_W] * spin[k]
         moment[k] += memory[S]
@@ -126,7 +126,8 @@ class Pose(LoadControlPart, Delays):
     damping: Annotated[float, Field(ge=0.0, le=5.0)] = 1.0
     """Its damping ratio."""
     integral: Annotated[float, Field(ge=0.0, le=5.0)] = 0.3
-    """Rate at which a lasting error of the attitude is integrated, over that frequency; 0: not at all."""
+    """Rate at which a lasting error of the attitude is integrated, 1/s: moment per angle and second, over weight and half the
+    largest edge of the load, as stiff as the cables hold it themselves. 0: not at all."""
     most_moment: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
     """Bound on the integral, over weight and half the largest edge of the load."""
     rate: Annotated[float, Field(gt=0.0, le=5.0)] = 0.45
@@ -145,12 +146,12 @@ class Pose(LoadControlPart, Delays):
     def params(self, team: Team) -> Vector:
         assert team.body is not None
         rate = min(self.rate * self.bandwidths(team).velocity, sway(team))
-        weight, w = team.load_mass * team.gravity, self.turn
+        w, hold = self.turn, 0.5 * team.load_mass * team.gravity * float(np.max(team.body.size))
         return PARAMS.pack(
             team.n, m=team.load_mass, g=team.gravity, rate=rate,
             tangent=math.tan(math.radians(self.max_lean_deg)),
             k_p=team.load_mass * self.place**2, k_d=2.0 * team.load_mass * self.place,
-            k_R=w * w, k_W=2.0 * self.damping * w, k_I=self.integral * w**3,
+            k_R=w * w, k_W=2.0 * self.damping * w, k_I=self.integral * hold,
             J=team.body.inertia.ravel(), centre=team.body.centre,
-            most=self.most_moment * weight * 0.5 * float(np.max(team.body.size)),
+            most=self.most_moment * hold,
         )  # fmt: skip

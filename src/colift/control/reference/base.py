@@ -34,13 +34,15 @@ class ReferencePart(Part):
             found += [(name, "turns the load, which is a point: load.kind") for name in given]
         return found
 
-    def attitude(self, team: Team, time: float = 0.0) -> Vector:
-        """Attitude (4,) that is wanted of a rigid load at a time, wxyz."""
+    def pose(self, team: Team, time: float = 0.0) -> tuple[Vector, Vector, Vector]:
+        """Motion (4, 3), attitude (4,), wxyz, and rates with two derivatives (3, 3) that are wanted at a time, s."""
         port = PORTS["reference"]
         signals = port.signals(team.n)
         wire = port.wire(type(self).kernel, self.params(team), np.zeros(0), signals)
         port.invoke(wire, 0, time, 0.0)
-        return signals["reference_attitude"]
+        names = ("reference", "reference_attitude", "reference_rates")
+        motion, attitude, rates = (signals[name] for name in names)
+        return motion, attitude, rates
 
     def sample(self, times: Vector, team: Team | None = None) -> Vector:
         """Reference at the given times: (len(times), 4, 3)."""

@@ -1,0 +1,127 @@
+"""A rigid load with an attitude: what is wanted, who flies it, what is refused."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colift.control.reference.figure_eight import FigureEight
+from colift.errors import MissionError
+from colift.flight.flight import Flight
+from colift.mission import load_mission
+from colift.mission.planned import planned
+from colift.record import metrics
+from colift.team import Team
+from colift.team.geometry import matrix_of
+
+BOX: dict[str, Any] = {
+    "name": "box",
+    "load": {"kind": "rigid", "mass": 0.5, "size": [0.6, 0.4, 0.2]},
+    "reference": {"kind": "hover", "position": [0.0, 0.0, 1.5]},
+    "timing": {"duration": 2.0},
+}
+
+
+def test_rates_are_the_derivatives_of_the_wanted_attitude() -> None:
+    eight = FigureEight(roll_deg=20.0, pitch_deg=-15.0, yaw_deg=70.0, ramp=2.0, period=3.0)
+    team, h = Team.uniform(3), 1e-4
+    for t in (0.7, 1.9, 4.2):
+        turn = [matrix_of(eight.pose(team, t + k * h)[1]) for k in (-1, 0, 1)]
+        slope = turn[1].T @ (turn[2] - turn[0]) / (2.0 * h)
+        rates = [eight.pose(team, t + k * h)[2] for k in (-1, 0, 1)]
+        spin = np.array([slope[2, 1], slope[0, 2], slope[1, 0]])
+        assert rates[1][0] == pytest.approx(spin, abs=1e-5)
+        assert (rates[2][:2] - rates[0][:2]) / (2.0 * h) == pytest.approx(rates[1][1:], abs=1e-4)
+    assert np.abs(rates[1]).max() > 1.0
+
+
+def test_a_tilted_box_with_its_centre_of_mass_aside_hovers() -> None:
+    """Force and moment balance where nothing is symmetric; what is wrong with the told inertia costs nothing at rest."""
+    load = {**BOX["load"], "centre_of_mass": [0.05, -0.03, 0.02]}
+    reference = {**BOX["reference"], "attitude_deg": [8.0, -5.0, 30.0]}
+    truth = {"load_inertia_factor": 1.3}
+    mission = load_mission({**BOX, "load": load, "reference": reference, "truth": truth})
+    recording = Flight(mission).run()
+    found = metrics.compute(recording)
+    assert found["tracking_max_m"] < 1e-3
+    assert found["attitude_max_deg"] < 0.3
+    assert found["slack_time_s"] == 0.0
+
+
+def test_a_push_of_the_centre_of_mass_that_nobody_told_is_integrated_away() -> None:
+    offset = {"centre_of_mass_offset": [0.02, 0.01, 0.0]}
+    recording = Flight(load_mission({**BOX, "truth": offset, "timing": {"duration": 12.0}})).run()
+    error = np.degrees(np.linalg.norm(metrics.attitude_error(recording), axis=1))
+    late = error[recording.time > 11.0].max()
+    assert error.max() > 0.5
+    assert late < 0.3 * error.max()
+
+
+def test_noise_delay_and_wrong_attachments() -> None:
+    periods = ("load_control", "allocation", "position_control", "attitude_control")
+    timing = {"duration": 10.0, "delay": 0.02, **dict.fromkeys(periods, 0.01)}
+    mission = load_mission(
+        "box-figure-eight",
+        {
+            **{f"timing.{name}": value for name, value in timing.items()},
+            "sensing.kind": "noisy",
+            "truth.attachment_offset": [[0.01, 0, 0], [0, -0.01, 0], [-0.01, 0, 0], [0, 0, 0.01]],
+        },
+    )
+    found = metrics.compute(Flight(mission).run())
+    assert found["tracking_max_m"] < 0.08
+    assert found["attitude_max_deg"] < 8.0
+    assert found["slack_time_s"] == 0.0
+
+
+def test_the_angle_between_two_attitudes_and_its_part_about_the_vertical() -> None:
+    recording = Flight(load_mission(BOX)).run()
+    half = math.radians(10.0)
+    recording["load_attitude"][:] = [math.cos(half), 0.0, 0.0, -math.sin(half)]
+    recording["reference_attitude"][:] = [1.0, 0.0, 0.0, 0.0]
+    found = metrics.compute(recording)
+    for name in ("attitude_rms_deg", "attitude_max_deg", "yaw_max_deg"):
+        assert found[name] == pytest.approx(20.0)
+    point = metrics.compute(Flight(load_mission("hover", {"timing.duration": 0.5})).run())
+    assert all(
+        math.isnan(point[n]) for n in ("attitude_rms_deg", "attitude_max_deg", "yaw_max_deg")
+    )
+
+
+def test_a_motion_that_asks_too_much_is_refused_with_drone_moment_and_numbers() -> None:
+    with pytest.raises(MissionError, match=r"asks drone 2 at 3\.\d* s to turn its thrust with 8\d"):
+        load_mission("box-figure-eight", {"drones.count": 3, "reference.ramp": 3.0})
+
+
+def test_in_hover_the_plan_holds_the_weight_and_turns_nobody() -> None:
+    mission = load_mission(BOX)
+    found = planned(mission.team, mission.reference, np.linspace(0.0, 1.0, 20))
+    assert np.all(found.tensions.sum(axis=1) > 0.5 * 9.81)
+    assert np.nanmax(found.turning) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"allocation": {"kind": "safe"}}, "shares forces only"),
+        ({"load_control": {"kind": "pid"}}, "wants no moment"),
+        ({"supervision": {"kind": "lift"}}, "lifts a load that is a point"),
+        ({"load": {"kind": "rigid", "mass": 0.5}}, r"load\.size.*required"),
+        ({"load": {"mass": 0.5, "size": [1.0, 1.0, 1.0]}}, "is of a rigid load"),
+        ({"load": {"kind": "rigid", "size": [1.0, 0.0, 0.0]}}, r"load\.inertia.*without width"),
+        ({"load": {**BOX["load"], "inertia": [1.0, 1.0, 3.0]}}, "none exceeds the sum"),
+        ({"load": {**BOX["load"], "attachments": [[0.0, 0.0, 0.0]] * 3}}, "attachments"),
+        ({"estimation": {"kind": "predictor", "load_from": "cables"}}, "needs its sensor"),
+    ],
+)
+def test_what_a_rigid_load_cannot_fly_with_is_refused(change: dict[str, Any], says: str) -> None:
+    with pytest.raises(MissionError, match=says):
+        load_mission({**BOX, **change})
+
+
+def test_a_point_load_is_asked_for_no_attitude() -> None:
+    with pytest.raises(MissionError, match=r"reference\.yaw_deg.*turns the load, which is a point"):
+        load_mission("figure-eight", {"reference.yaw_deg": 20.0})
