@@ -54,7 +54,7 @@ TABLE = [
     ({"drones.number": 3}, ["drones.number: unknown key", "count, mass, inertia, cable_length"]),
     ({"start.cone": 35.0}, ["start.cone: unknown key", "did you mean 'cone_deg'?"]),
     ({"timing.dt": 0.001}, ["timing.dt: unknown key", "duration, step"]),
-    ({"reference.centre": [0, 0, 1]}, ["reference.centre: unknown key", "position, kind"]),
+    ({"reference.centre": [0, 0, 1]}, ["reference.centre: unknown key", "position, attitude_deg, kind"]),
     ({"load_control.kp": [1, 1, 1]}, ["load_control.kp", "did you mean 'k_p'?"]),
     ({"position_control.kp": 1}, ["position_control.kp: unknown key"]),
     ({"attitude_control.roh": 1}, ["attitude_control.roh", "did you mean 'rho'?"]),

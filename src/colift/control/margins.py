@@ -129,6 +129,11 @@ class Bodies(NamedTuple):
     number: int
 
 
+def times(factor: Response | float, row: Response) -> Response:
+    """A row of coefficients (k, m), each times a response (k,)."""
+    return np.asarray(np.reshape(factor, (-1, 1)) * row)
+
+
 @dataclass(frozen=True)
 class Margin:
     """Of one loop.
@@ -294,18 +299,13 @@ class Loops:
         zeros = unstable_zeros(whole * (s / (s + REFERENCE)) ** 2)
         return margin_of(self.w, whole, zeros)
 
-    def together(self, bodies: Bodies) -> tuple[Margin, Margin]:
-        """All drones and the load: the loop at the drones' force, and that at the wanted lean of the cables."""
+    def _commands(
+        self, bodies: Bodies, y: Response, phi: Response, F: Response, lean: Response
+    ) -> tuple[Response, Response, Response]:
+        """Force and moment that are asked of the drones, and the lean that is asked of the cables, as rows of the unknowns (k, 5)."""
         s, law, k = self.s, self.places, self.w.size
         M, m_L, W, h, I, _ = bodies  # noqa: E741
         bent = W * I / (M * h)  # what the drones' outward forces resist a turn with, N m
-        y, phi, F, N, lean = (np.zeros((k, 5), dtype=complex) for _ in range(5))
-        for i, unit in enumerate((y, phi, F, N, lean)):
-            unit[:, i] = 1.0
-
-        def times(factor: Response | float, row: Response) -> Response:
-            return np.reshape(factor, (-1, 1)) * row
-
         axis = times(self.axis, F)
         acceleration = (axis - W * lean) / M
         place = times(self.drones.place, y) + times(self.drones.place_known, acceleration)
@@ -350,6 +350,17 @@ class Loops:
             asked = -(times(gain, load_place) + self.hanging.speed * load_speed) / W
         if bodies.number > 2:
             asked = EASED * asked
+        return u, moment, asked
+
+    def together(self, bodies: Bodies) -> tuple[Margin, Margin]:
+        """All drones and the load: the loop at the drones' force, and that at the wanted lean of the cables."""
+        s, k = self.s, self.w.size
+        M, m_L, W, h, I, _ = bodies  # noqa: E741
+        bent = W * I / (M * h)  # what the drones' outward forces resist a turn with, N m
+        y, phi, F, N, lean = (np.zeros((k, 5), dtype=complex) for _ in range(5))
+        for i, unit in enumerate((y, phi, F, N, lean)):
+            unit[:, i] = 1.0
+        u, moment, asked = self._commands(bodies, y, phi, F, lean)
         rows = np.empty((k, 5, 5), dtype=complex)
         s2 = s**2
         rows[:, 0] = times((M + m_L) * s2, y) - times(m_L * h * s2, phi) - F

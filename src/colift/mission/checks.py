@@ -61,17 +61,7 @@ def cross_checks(
                 yield Problem(f"{name}.{field}", value, message)
     n, timing = frame.drones.count, frame.timing
     if "drones" not in broken:
-        for field, value, message in frame.truth.wrong_lengths(n):
-            broken.add("truth")
-            yield Problem(f"truth.{field}", value, message)
-        ends = frame.load.attachments
-        if ends is not None and len(ends) != n:
-            broken.add("load")
-            yield Problem("load.attachments", f"{len(ends)} points", f"must be drones.count = {n}")
-        given = frame.start.directions
-        if given is not None and len(given) != n:
-            message = f"must be drones.count = {n}"
-            yield Problem("start.directions", f"{len(given)} directions", message)
+        yield from _length_checks(frame, n, broken)
     if not broken & {"drones", "timing"}:
         size = recorded_bytes(n, timing)
         if size > MAX_RECORDING:
@@ -212,6 +202,21 @@ def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
         value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
         message = f"must leave the drones (drones.radius) apart: {found[1].format(*drones)}"
         yield Problem(f"start.{field}", value, message.replace("touched", "touch"))
+
+
+def _length_checks(frame: Frame, n: int, broken: set[str]) -> Iterable[Problem]:
+    """Lists with one value per drone that have another number of them."""
+    for field, value, message in frame.truth.wrong_lengths(n):
+        broken.add("truth")
+        yield Problem(f"truth.{field}", value, message)
+    ends = frame.load.attachments
+    if ends is not None and len(ends) != n:
+        broken.add("load")
+        yield Problem("load.attachments", f"{len(ends)} points", f"must be drones.count = {n}")
+    given = frame.start.directions
+    if given is not None and len(given) != n:
+        message = f"must be drones.count = {n}"
+        yield Problem("start.directions", f"{len(given)} directions", message)
 
 
 def hover_checks(

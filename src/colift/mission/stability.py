@@ -95,6 +95,12 @@ def loops_of(mission: Mission) -> list[Judged]:
         places.append(whole)
         if time.leaning is not None:
             loads.append(hung)
+    return judged + _worst(places, loads)
+
+
+def _worst(places: list[Margin], loads: list[Margin]) -> list[Judged]:
+    """The least margin of position and, where that is stable, of load."""
+    judged: list[Judged] = []
     for loop, layer, margins in (
         ("position", "position_control", places),
         ("load", "load_control", loads),

@@ -499,7 +499,8 @@ class Allocator:
         except (TypeError, ValueError):
             wanted = motion = turning = np.empty(0)
         if wanted.shape != (3,) or motion.shape != (3,) or turning.shape != (3,):
-            _refuse(dt, force=force, acceleration=acceleration, moment=moment)
+            given = {"acceleration": acceleration, "moment": moment}
+            _refuse(dt, force=force, **{k: v for k, v in given.items() if v is not None})
         if attitude is not None:
             self._attitude[:] = numbers("attitude", attitude, (4,), finite=False)
         if wanted_attitude is not None:
@@ -537,8 +538,7 @@ class Allocator:
 def _refuse(dt: float | None, **vectors: ArrayLike | None) -> None:
     """Say what of it is not the numbers that :meth:`Allocator.allocate` takes."""
     for name, value in vectors.items():
-        if value is not None:
-            numbers(name, value, (3,), finite=False)
+        numbers(name, value, (3,), finite=False)
     if dt is not None:
         numbers("dt", dt, (), finite=False)
 

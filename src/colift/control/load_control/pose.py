@@ -112,7 +112,7 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 class Pose(LoadControlPart, Delays):
     """A rigid load's place and attitude: feed-forward of its motion, geometric PID of its attitude.
 
-    Its place is held by the formation of the drones (position control of kind ``formation``); ``place`` adds feedback of its own.
+    A point has no attitude: of it no moment is wanted. The place is held by the formation of the drones (position control of kind ``formation``); ``place`` adds feedback of its own.
     """
 
     kernel = _pose
@@ -138,20 +138,18 @@ class Pose(LoadControlPart, Delays):
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "load_control")
 
-    def check(self, team: Team) -> list[tuple[str, str]]:
-        if team.body is None:
-            return [("kind", "controls an attitude: the load must be rigid (load.kind)")]
-        return super().check(team)
-
     def params(self, team: Team) -> Vector:
-        assert team.body is not None
+        body = team.body
+        inertia, centre, size = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+        if body is not None:
+            inertia, centre, size = body.inertia, body.centre, body.size
         rate = min(self.rate * self.bandwidths(team).velocity, sway(team))
-        w, hold = self.turn, 0.5 * team.load_mass * team.gravity * float(np.max(team.body.size))
+        w, hold = self.turn, 0.5 * team.load_mass * team.gravity * float(np.max(size))
         return PARAMS.pack(
             team.n, m=team.load_mass, g=team.gravity, rate=rate,
             tangent=math.tan(math.radians(self.max_lean_deg)),
             k_p=team.load_mass * self.place**2, k_d=2.0 * team.load_mass * self.place,
             k_R=w * w, k_W=2.0 * self.damping * w, k_I=self.integral * hold,
-            J=team.body.inertia.ravel(), centre=team.body.centre,
+            J=inertia.ravel(), centre=centre,
             most=self.most_moment * hold,
         )  # fmt: skip

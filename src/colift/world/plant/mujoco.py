@@ -112,9 +112,8 @@ def _scene(params: bytes) -> _Scene:
 
 
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
-    dt = now.dt
+    dt, attached = now.dt, sees.attached
     thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
-    attached = sees.attached
     tensions, peak_tensions = writes.tensions, writes.peak_tensions
     catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
     import mujoco
