@@ -48,13 +48,10 @@ WAYS: dict[str, Overrides] = {
 }
 
 LIGHT: Overrides = {"truth.load_mass_factor": 0.5}
-WIDE = {"observation.total": 1.2, "observation.own": 1.2}
 EXACT = {f"sensing.{name}": value for name, value in stress.EXACT.items()}
-SENSORS_AND_GAINS: dict[str, Overrides] = {
+SENSORS: dict[str, Overrides] = {
     "as they are": {},
     "exact": EXACT,
-    "wider: `observation.total` and `own` 1.2": WIDE,
-    "exact and wider": {**EXACT, **WIDE},
 }
 """Whether better sensors would serve the observers."""
 
@@ -99,10 +96,10 @@ def measure(seeds: Iterable[int]) -> dict[str, list[list[str]]]:
             ),
         ],
         "told-sensors": [
-            ["sensors, bandwidth", "load +50 %", "load -50 %"],
+            ["sensors", "load +50 %", "load -50 %"],
             *(
                 [name, *(fly({**change, **load}, seeds) for load in ({}, LIGHT))]
-                for name, change in SENSORS_AND_GAINS.items()
+                for name, change in SENSORS.items()
             ),
         ],
         "told-ropes": [
