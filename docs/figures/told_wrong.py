@@ -49,7 +49,7 @@ WAYS: dict[str, Overrides] = {
 
 LIGHT: Overrides = {"truth.load_mass_factor": 0.5}
 EXACT = {f"sensing.{name}": value for name, value in stress.EXACT.items()}
-SENSORS: dict[str, Overrides] = {
+BETTER: dict[str, Overrides] = {
     "as they are": {},
     "exact": EXACT,
 }
@@ -99,7 +99,7 @@ def measure(seeds: Iterable[int]) -> dict[str, list[list[str]]]:
             ["sensors", "load +50 %", "load -50 %"],
             *(
                 [name, *(fly({**change, **load}, seeds) for load in ({}, LIGHT))]
-                for name, change in SENSORS.items()
+                for name, change in BETTER.items()
             ),
         ],
         "told-ropes": [

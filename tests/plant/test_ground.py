@@ -16,7 +16,7 @@ from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.team import Ground, Team
 from colift.world.plant._chain import level_arc
-from colift.world.plant._contact import RATE, damping_ratio, feet
+from colift.world.plant._contact import ANCHORS, RATE, damping_ratio, feet
 from colift.world.plant.mujoco import Mujoco
 
 SETTINGS = {"bead-cables": {"drag_coefficient": 0.0, "beads": 2}}
@@ -57,13 +57,16 @@ def apart(team, plant, height=0.0):
 def let_go(rig):
     """Put the anchors below bodies that were moved by hand."""
     if rig.part.anchored:
-        rig.memory[-2 * (rig.n + 1) :] = [*rig.load[0, :2], *rig.drones[:, :2].ravel()]
+        anchors = rig.memory[-ANCHORS.size(rig.n) :]
+        ANCHORS.view(anchors, "load")[:2] = rig.load[0, :2]
+        ANCHORS.view(anchors, "drone")[:] = rig.drones[:, :2]
 
 
 def contact_energy(rig):
     """Of the springs that press and of those that hold, J."""
     w, height = RATE, rig.team.ground.height
-    anchors = rig.memory[-2 * (rig.n + 1) :].reshape(-1, 2)
+    own = rig.memory[-ANCHORS.size(rig.n) :]
+    anchors = np.vstack([ANCHORS.view(own, "load")[:2], ANCHORS.view(own, "drone")])
     places = np.vstack([rig.load[0, :2], rig.drones[:, :2]])
     masses = np.append(rig.team.load_mass, rig.team.masses)
     total = 0.5 * w**2 * masses @ np.sum((places - anchors) ** 2, axis=1)

@@ -740,7 +740,6 @@ class SafeWrench(AllocatorPart):
     """
 
     kernel = _allocate
-    remembers = MEMORY
     wrenches = True
     spread_setting = ("cone_deg", (10.0, 20.0, 30.0, 40.0, 50.0))
     per_drone = ("tension_min", "tension_max", "max_thrust", "min_distance", "cable_distance")
