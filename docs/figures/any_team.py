@@ -8,35 +8,21 @@ well, so that false alarms are counted. No tuning saw these seeds.
 
 from __future__ import annotations
 
-import importlib.util
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
-from pathlib import Path
 from typing import Any
 
-from pages import fill, stored, table
+from pages import benchmark, fill, stored, table
 
 from colift.kernel.math import shares
 
 FIRST, MISSIONS = 67_000, 400
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "any_team.py"
 TEAMS = {"one drone": (1,), "two": (2,), "three to eight": tuple(range(3, 9))}
 
 
-@cache
-def _benchmark() -> Any:
-    spec = importlib.util.spec_from_file_location("any_team_benchmark", BENCHMARK)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def fly(seed: int) -> Mapping[str, Any]:
-    return _benchmark().fly((seed, True))
+    return benchmark("any_team").fly((seed, True))
 
 
 def digest(found: Iterable[Mapping[str, Any]]) -> list[list[Any]]:

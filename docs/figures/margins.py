@@ -9,12 +9,10 @@ controllers, half the paper's cascade with gains for the delay. The threshold of
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +20,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.patches import Patch
-from pages import fill, stored, table
+from pages import benchmark, fill, stored, table
 
 from colift.control.attitude_control.delay_aware import DelayAware
 from colift.control.tuning import LEAN
@@ -55,22 +53,11 @@ GAINS, DELAYS, LAGS = (
 )
 SOME_GAINS, SOME_DELAYS = (0.3, 0.6, 1.0, 1.4, 2.0, 2.8), (0.005, 0.02, 0.035, 0.05, 0.065)
 TOLD = ("load_control", "position_control", "attitude_control", "observation")
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "any_team.py"
-
-
-@cache
-def _benchmark() -> Any:
-    spec = importlib.util.spec_from_file_location("any_team_benchmark", BENCHMARK)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def draw(seed: int) -> dict[str, Any]:
     """A random team in calm air with gains of its own, as the table of a mission's file."""
-    table: dict[str, Any] = _benchmark().draw(seed)
+    table: dict[str, Any] = benchmark("any_team").draw(seed)
     table.pop("disturbance", None)
     rng = np.random.default_rng([seed, 1])
 

@@ -1,8 +1,10 @@
 """What the scripts that write parts of the pages share."""
 
+import importlib.util
 import json
 import sys
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,19 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     head = list(header)
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+@cache
+def benchmark(name: str) -> Any:
+    """A script of the folder ``benchmarks``, as a module."""
+    spec = importlib.util.spec_from_file_location(
+        f"{name}_benchmark", DOCS.parent / "benchmarks" / f"{name}.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def stored(script: str, measure: Callable[[], Any]) -> Any:

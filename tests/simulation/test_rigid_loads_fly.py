@@ -13,7 +13,9 @@ from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.mission.planned import planned
+from colift.mission.warnings import warnings_of
 from colift.record import metrics
+from colift.record.verdict import criteria_of
 from colift.team import Team
 from colift.team.geometry import matrix_of
 
@@ -98,9 +100,49 @@ def test_a_motion_that_asks_too_much_is_refused_with_drone_moment_and_numbers() 
 
 def test_in_hover_the_plan_holds_the_weight_and_turns_nobody() -> None:
     mission = load_mission(BOX)
-    found = planned(mission.team, mission.reference, np.linspace(0.0, 1.0, 20))
+    times = np.linspace(0.0, 1.0, 20)
+    found = planned(mission.team, mission.reference, mission.position_control, times)
+    assert found is not None
     assert np.all(found.tensions.sum(axis=1) > 0.5 * 9.81)
     assert np.nanmax(found.turning) < 1e-9
+
+
+def test_position_control_leads_the_cables_as_was_planned_before_the_flight() -> None:
+    mission = load_mission("box-figure-eight")
+    flight = Flight(mission)
+    flight.advance(6.5)
+    state = flight.wires.position_control.memory[-9 * 4 :].reshape(4, 3, 3)
+    times = flight.time + 1e-3 * np.arange(-3, 1)  # the last step began a millisecond ago
+    before = planned(mission.team, mission.reference, mission.position_control, times)
+    assert before is not None
+    assert np.linalg.norm(state[:, 0], axis=1) == pytest.approx(before.tensions[2], rel=1e-6)
+
+
+def test_a_new_reference_that_asks_for_no_attitude_gets_none() -> None:
+    stay = {"kind": "hover", "position": [0.0, 0.0, 1.5]}
+    event = {"at": 6.5, "field": "reference", "value": stay}
+    flight = Flight(load_mission("box-figure-eight", {"events": [event]}))
+    flight.advance(6.49)
+    assert np.abs(flight.bus.reference_rates[0]).max() > 0.1
+    flight.advance(0.02)
+    assert flight.bus.reference_attitude.tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert not flight.bus.reference_rates.any()
+
+
+def test_who_cannot_hold_the_load_level_brings_it_down_and_says_so() -> None:
+    event = {"at": 1.0, "field": "drones.lose", "value": 1}
+    recording = Flight(load_mission({**BOX, "events": [event]})).run()
+    assert recording.outcome.startswith(
+        "descended from t = 1 s: its 3 cables hold the load only leaning"
+    )
+
+
+def test_an_attitude_that_nobody_can_hold_is_warned_of_and_judged() -> None:
+    bar = {"kind": "rigid", "mass": 0.5, "size": [1.2, 0.1, 0.1]}
+    mission = load_mission({**BOX, "load": bar, "drones": {"count": 2}})
+    assert any("swings freely" in str(each) for each in warnings_of(mission))
+    assert criteria_of(mission)["attitude_max_deg"].max == 20.0
+    assert "attitude_max_deg" not in criteria_of(load_mission("hover"))
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from colift.control.reference.base import ReferencePart
 from colift.errors import ColiftError, Problem, SettingError
 from colift.flight.leg import Leg, Stretch, due_rows, places_of
 from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
@@ -23,7 +24,6 @@ from colift.kernel.math import winch
 from colift.kernel.ports import PORTS, hold, hold_answer
 from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
-from colift.mission.planned import planned_directions
 from colift.mission.schema import Event
 from colift.mission.warnings import warnings_of
 from colift.part import LAYERS, Part, Vector, make
@@ -88,12 +88,9 @@ class Flight:
         start, thrusts = start_state(mission)
         self._begin_leg(drones, self._fresh_memory(drones, start))
         bus = self.bus
-        self.wires.reference.writes.reference[:] = bus.reference[:] = mission.reference.sample(
-            np.zeros(1), mission.team.of(drones)
-        )[0]
-        self.wires.reference.writes.reference_attitude[:] = bus.reference_attitude[:] = (
-            start.load_attitude
-        )
+        self._refer_anew()
+        bus.reference[:] = self.wires.reference.writes.reference
+        bus.reference_attitude[:] = start.load_attitude
         bus.desired_directions[:] = start.directions
         bus.received_directions[:] = start.directions
         bus.thrusts[:] = thrusts
@@ -207,8 +204,7 @@ class Flight:
             For a value of another shape, or one that is not finite.
 
         """
-        kernel = type(self._parts[layer]).kernel if layer in self._parts else None
-        if getattr(kernel, "py_func", kernel) not in (hold, hold_answer):
+        if layer not in self._parts or not _is_driven(self._parts[layer]):
             raise ColiftError(f'{layer}: only a layer of kind "external" is driven from outside')
         if unknown := {*signals} - {*PORTS[layer].writes}:
             raise ColiftError(
@@ -250,6 +246,8 @@ class Flight:
                 raise ColiftError(f"{section}: cannot change like this in flight")
             _refill(wire.params, packed, section)
             self._parts[section] = part
+            if section == "reference":
+                self._refer_anew()
         else:
             self._parts[section] = part
             self.regroup(self.drones, anew={section})
@@ -299,11 +297,22 @@ class Flight:
         bus.thrusts[new] = team.masses[new] * team.gravity
         if bus.reeled.any():
             self._rebind()
-        for now, before in zip(
-            self.wires.reference.writes, old.circuit.wires.reference.writes, strict=True
-        ):
-            if now.shape == before.shape:
-                now[:] = before
+        if _is_driven(self._parts["reference"]) and "reference" not in (anew or ()):
+            wires = self.wires.reference.writes, old.circuit.wires.reference.writes
+            for now, before in zip(*wires, strict=True):
+                if now.shape == before.shape:
+                    now[:] = before
+        else:
+            self._refer_anew()
+
+    def _refer_anew(self) -> None:
+        """Write what the reference wants now: one that asks for no attitude would leave what stood there before it."""
+        wanted, writes = self._parts["reference"], self.wires.reference.writes
+        assert isinstance(wanted, ReferencePart)
+        motion, attitude, rates = wanted.of(self.drones).pose(self._legs[-1].team, self.clock)
+        writes.reference[:], writes.reference_attitude[:], writes.reference_rates[:] = (
+            motion, attitude, rates,
+        )  # fmt: skip
 
     def recording(self, since: float = 0.0) -> Recording:
         """What has been recorded, from ``since`` (s) on; NaN for a drone that has left."""
@@ -610,6 +619,12 @@ def random_key(seed: int, name: str) -> int:
     return int.from_bytes(digest[:8], "big", signed=True)
 
 
+def _is_driven(part: Part) -> bool:
+    """Whether what its layer writes is set from outside."""
+    kernel = type(part).kernel
+    return getattr(kernel, "py_func", kernel) in (hold, hold_answer)
+
+
 def _with(part: AnyPart, section: str, name: str, value: Any) -> AnyPart:
     """A copy with one setting changed, validated."""
     try:
@@ -634,9 +649,12 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
     directions = mission.start_directions()
     first = mission.reference.sample(np.zeros(1), team)[0]
     weight = [0.0, 0.0, team.load_mass * team.gravity]
-    _, attitude, _ = mission.reference.pose(team)
-    if team.body is not None and mission.start.directions is None and team.gravity > 0.0:
-        directions = planned_directions(team, mission.reference)
+    pose = mission.reference.pose(team)
+    attitude = pose[1]
+    if mission.start.directions is None:
+        pulls = mission.position_control.of(drones).planned_pulls(team, [pose])
+        if pulls is not None:
+            directions = pulls[0] / np.linalg.norm(pulls[0], axis=1, keepdims=True)
     levers = team.levers @ matrix_of(attitude).T
     tensions = np.maximum(min_norm_tensions(directions, weight, levers), 0.0)
     thrust = team.hover_forces(tensions, directions)

@@ -24,6 +24,9 @@ LEVELS: tuple[Level, ...] = ("pass", "warn", "fail", "lost")
 NEAR = 0.5
 """Largest distance of the load from its reference unless the mission says another, m."""
 
+TURNED = 20.0
+"""Largest angle of a rigid load from its wanted attitude unless the mission says another, degrees."""
+
 UPRIGHT = 90.0
 """Tilt beyond which a drone is turned over, degrees."""
 
@@ -116,7 +119,8 @@ def limits(mission: Described) -> Limits:
 def criteria_of(mission: Described) -> dict[str, Bound]:
     """The bounds of a mission by metric: its own, and a default for what it does not name.
 
-    By default the load stays within :data:`NEAR` of its reference and above the ground, no drone turns over, and
+    By default the load stays within :data:`NEAR` of its reference, a rigid one within :data:`TURNED` of its attitude, and above
+    the ground, no drone turns over, and
     every actual angle and distance is at least what the allocator was asked for; where the allocator changes in
     flight, the least that it was asked for. A real flight, whose frame and allocator are not ours, has no defaults.
     """
@@ -130,6 +134,8 @@ def criteria_of(mission: Described) -> dict[str, Bound]:
         ),
         "max_tilt_deg": Bound(max=UPRIGHT),
     }
+    if mission.load.kind == "rigid":
+        default["attitude_max_deg"] = Bound(max=TURNED)
     for metric, setting in _ASKED.items():
         asked = _least_asked(mission, setting)
         if asked:

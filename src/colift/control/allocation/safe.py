@@ -18,23 +18,13 @@ from colift.control.allocation.base import (
     INFO_RESIDUAL,
     SIGNATURE,
     Allocator,
-    AllocatorPart,
     Motors,
     Status,
 )
 from colift.control.allocation.common.oracle import paper_objective
 from colift.control.allocation.limits import cycle, distance, newton, recovery
 from colift.control.allocation.limits import feasibility as feasible
-from colift.control.allocation.limits.usual import (
-    CLEAR,
-    LOW,
-    MOST,
-    RATE,
-    SWINGING,
-    Degrees,
-    Distance,
-    Force,
-)
+from colift.control.allocation.limits.usual import Degrees, Distance, Force, Limited, share_of
 from colift.control.allocation.paper import newton as paper
 from colift.errors import Problem, SettingError
 from colift.kernel.jit import kernel
@@ -240,7 +230,7 @@ RECOVERY = 5.0
 """Time in which a start that breaks a limit must be led back, s."""
 
 
-class Safe(AllocatorPart):
+class Safe(Limited):
     """The paper's cost under hard limits on cables, pairs of cables and drones.
 
     The limits hold in every answer. Where they do not allow the whole force, the force gives way, its
@@ -331,41 +321,23 @@ class Safe(AllocatorPart):
         return self
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        return super().check(team) or self._crossed(team)
+        one = (self.tension_min is None) != (
+            self.tension_max is None
+        )  # both given are checked alone
+        return super().check(team) or (self.crossed(team) if one else [])
 
     def asked_angles(self, team: Team) -> tuple[Array, Array]:
         """As :meth:`pair_angles`, with ellipsoids as the spheres within them: what no formation can do without."""
         sizes, least = self.drone_distances(team), math.radians(self.min_angle_deg)
         return distance.angles_of(team.cable_lengths, sizes, self.cable_distances(team), least)
 
-    def _crossed(self, team: Team) -> list[tuple[str, str]]:
-        """A given limit of the tension beyond the other, which is left to the team."""
-        low, high = self.settled("tension_min", team), self.settled("tension_max", team)
-        if (self.tension_min is None) == (self.tension_max is None) or np.all(1.2 * low <= high):
-            return []
-        i = int(np.argmax(1.2 * low - high))
-        message = (
-            f"tension_min = {low[i]:.4g} conflicts with tension_max = {high[i]:.4g}: "
-            "each cable needs tension_max of at least 1.2 tension_min"
-        )
-        return [("tension_min" if self.tension_max is None else "tension_max", message)]
-
     def left_open(self, team: Team) -> dict[str, Vector]:
-        known = np.isfinite(team.max_thrusts)
-        share = team.load_mass * max(team.gravity, 1e-3) / team.n
-        lifts = MOST * team.max_thrusts - team.masses * team.gravity
-        weight = share * team.n
-        turn = RATE / math.sqrt(float(team.cable_lengths.mean())) if team.n > 2 else SWINGING
-        own = known.all() and self._left
+        weight = team.n * share_of(team)
+        own = bool(np.isfinite(team.max_thrusts).all()) and self._left
         return {
             "mu": np.full(team.n, MU * weight**2 / team.n**3 if own else math.nan),
             "mu_force": np.full(team.n, weight if own else math.nan),
-            "max_rate": np.where(known.all(), np.full(team.n, turn), math.nan),
-            "tension_min": np.where(known, LOW * share, math.nan),
-            "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), math.nan),
-            "max_thrust": MOST * team.max_thrusts,
-            "min_distance": 2.0 * CLEAR * team.radii,
-            "cable_distance": CLEAR * team.radii,
+            **self.usual_limits(team),
         }
 
     def filled(self, team: Team) -> Safe:
@@ -389,10 +361,6 @@ class Safe(AllocatorPart):
         free = {"max_thrust", "tension_max"} & {*self.by_team(team)}
         return self.model_copy(update={**dict.fromkeys(free, ANY), "mu": 0.0})
 
-    def turn_rate(self, team: Team) -> float:
-        """Fastest turn of a cable's direction, rad/s."""
-        return float(self.settled("max_rate", team)[0])
-
     def penalty(self, team: Team) -> float:
         """Weight of the alignment penalty, N^2."""
         return float(self.settled("mu", team)[0])
@@ -404,30 +372,13 @@ class Safe(AllocatorPart):
         return self._left and bool(np.isfinite(team.max_thrusts).all())
 
     def conflicts(self, team: Team) -> list[tuple[str, str]]:
-        problems = []
-        most = self.thrust_limits(team)
-        own = team.masses * team.gravity
-        weak = np.flatnonzero(0.8 * most < own)
-        if weak.size:
-            i = int(weak[0])
-            need = f"drone {i} alone weighs {own[i]:.4g} N and needs a quarter more to fly"
-            told = (
-                "max_thrust",
-                f"max_thrust = {self.max_thrust} conflicts with drones.mass: {need}",
-            )
-            if "max_thrust" not in self.by_team(team):
-                problems.append(told)
-        return problems + feasible.conflicts_of(team, self)
+        return super().conflicts(team) + feasible.conflicts_of(team, self)
 
     def cannot_hold(self, team: Team, thrusts: Vector, directions: Vector) -> list[str]:
         return feasible.cannot_hold(team, self, thrusts, directions)
 
     def binding(self, team: Team, actuation: Motors) -> list[str]:
         return [str(each) for each in feasible.binding_limits(team, self, actuation)]
-
-    def thrust_limits(self, team: Team) -> Vector:
-        """Largest thrust of each drone (n,) as far as the allocator is told, N; inf: not limited."""
-        return self.settled("max_thrust", team)
 
     def cannot_start(self, team: Team, directions: Array) -> str:
         if self.keeps_pairs(team, directions) and self._keeps_cone(directions):
@@ -481,22 +432,6 @@ class Safe(AllocatorPart):
         """Of wanted drones from each other, in the ellipsoid's norm, and from each other's cables (..., n, n), m."""
         return distance.distances(team.cable_lengths, directions, self.downwash)
 
-    def tension_caps(self, team: Team) -> Vector:
-        """Largest tension of each cable (n,), N."""
-        return self.settled("tension_max", team)
-
-    def tension_floors(self, team: Team) -> Vector:
-        """Least tension of each cable (n,), N."""
-        return self.settled("tension_min", team)
-
-    def drone_distances(self, team: Team) -> Vector:
-        """Least distance of each drone (n,), m: two keep the mean of theirs; 0: not limited."""
-        return self.settled("min_distance", team)
-
-    def cable_distances(self, team: Team) -> Vector:
-        """Least distance of each drone (n,) from the others' cables, m; 0: not limited."""
-        return self.settled("cable_distance", team)
-
     def pair_angles(self, team: Team) -> tuple[Array, Array]:
         """Least angle of every pair (n, n), rad, with what distances ask for, and the bit of the limit that asks for it.
 
@@ -539,7 +474,7 @@ class Safe(AllocatorPart):
             mu=self.penalty(team),
             mu_scaled=self._scaled(team),
             mu_force=float(self.settled("mu_force", team)[0]),
-            sigma=max(team.load_mass * max(team.gravity, 1e-3) / n, 1e-6),
+            sigma=max(share_of(team), 1e-6),
             kappa=self.barrier,
             kappa_rate=RATE_BARRIER,
             kappa_pair=self.spread,

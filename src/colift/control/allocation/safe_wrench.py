@@ -18,22 +18,12 @@ from colift.control.allocation.base import (
     INFO_RESIDUAL,
     SIGNATURE,
     Allocator,
-    AllocatorPart,
     Status,
 )
 from colift.control.allocation.limits import elastic, metres
 from colift.control.allocation.limits.cycle import LEVEL as LEAN_MOST
 from colift.control.allocation.limits.cycle import MAX_TURN
-from colift.control.allocation.limits.usual import (
-    CLEAR,
-    LOW,
-    MOST,
-    RATE,
-    SWINGING,
-    Degrees,
-    Distance,
-    Force,
-)
+from colift.control.allocation.limits.usual import RATE, Degrees, Distance, Force, Limited, share_of
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion, wrench
@@ -731,7 +721,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     return _CONVERGED if outcome == elastic.CONVERGED else _ITERATION_LIMIT
 
 
-class SafeWrench(AllocatorPart):
+class SafeWrench(Limited):
     """The cable forces nearest to a hover formation that make the wanted force and moment, under hard limits.
 
     The limits hold in every answer. Where they do not allow the whole wrench, it gives way in this order: yaw, horizontal force,
@@ -793,51 +783,12 @@ class SafeWrench(AllocatorPart):
     """Most interior-point steps in one call; limits hold after every step."""
 
     def left_open(self, team: Team) -> dict[str, Vector]:
-        known = np.isfinite(team.max_thrusts)
-        share = _share(team)
-        lifts = MOST * team.max_thrusts - team.masses * team.gravity
-        turn = (TURNING if team.body is not None else RATE) / math.sqrt(
-            float(team.cable_lengths.mean())
-        )
-        if team.n <= 2:
-            turn = SWINGING
-        return {
-            "max_rate": np.where(known.all(), np.full(team.n, turn), math.nan),
-            "tension_min": np.where(known, LOW * share, math.nan),
-            "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), 6.0 * share),
-            "max_thrust": MOST * team.max_thrusts,
-            "min_distance": 2.0 * CLEAR * team.radii,
-            "cable_distance": CLEAR * team.radii,
-        }
+        found = self.usual_limits(team, RATE if team.body is None else TURNING)
+        caps = found["tension_max"]
+        return {**found, "tension_max": np.where(np.isnan(caps), 6.0 * share_of(team), caps)}
 
     def check(self, team: Team) -> list[tuple[str, str]]:
-        if problems := super().check(team):
-            return problems
-        low, high = self.settled("tension_min", team), self.settled("tension_max", team)
-        if np.all(1.2 * low <= high):
-            return []
-        i = int(np.argmax(1.2 * low - high))
-        message = (
-            f"tension_min = {low[i]:.4g} conflicts with tension_max = {high[i]:.4g}: "
-            "each cable needs tension_max of at least 1.2 tension_min"
-        )
-        return [("tension_max" if self.tension_min is None else "tension_min", message)]
-
-    def conflicts(self, team: Team) -> list[tuple[str, str]]:
-        most = self.thrust_limits(team)
-        own = team.masses * team.gravity
-        weak = np.flatnonzero(0.8 * most < own)
-        if not weak.size or "max_thrust" in self.by_team(team):
-            return []
-        i = int(weak[0])
-        need = f"drone {i} alone weighs {own[i]:.4g} N and needs a quarter more to fly"
-        return [
-            ("max_thrust", f"max_thrust = {self.max_thrust} conflicts with drones.mass: {need}")
-        ]
-
-    def thrust_limits(self, team: Team) -> Vector:
-        """Largest thrust of each drone (n,) as far as the allocator is told, N; inf: not limited."""
-        return self.settled("max_thrust", team)
+        return super().check(team) or self.crossed(team)
 
     def with_any_thrust(self, team: Team) -> SafeWrench:
         free = {"max_thrust", "tension_max"} & {*self.by_team(team)}
@@ -857,13 +808,14 @@ class SafeWrench(AllocatorPart):
         )
 
     def cannot_hold(self, team: Team, thrusts: Vector, directions: Array) -> list[str]:
-        """By its plan, level or leaning: what that needs of attachments, tensions and thrusts."""
+        """By its plan of the level load, as nobody leans it: what that needs of attachments, tensions and thrusts."""
         held = least_lean(team, **self._asked(team))
-        if held is None:
+        if held is None or held[0] > 0.0:
+            how = "neither level nor leaning" if held is None else "only leaning, not level"
             return [
-                f"its {team.n} cables hold the load neither level nor leaning: its weight is not between their ends"
+                f"its {team.n} cables hold the load {how}: its weight is not between their ends"
             ]
-        along, tensions = self.formation(team, held[1])
+        along, tensions = self.formation(team)
         problems = []
         caps = self.tension_caps(team)
         if np.any(tensions > caps):
@@ -876,26 +828,6 @@ class SafeWrench(AllocatorPart):
             i = int(np.argmax(needed - thrusts))
             problems.append(f"drone {i} would need {needed[i]:.3g} N of its {thrusts[i]:.3g} N")
         return problems
-
-    def turn_rate(self, team: Team) -> float:
-        """Fastest turn of a cable's direction, rad/s."""
-        return float(self.settled("max_rate", team)[0])
-
-    def tension_caps(self, team: Team) -> Vector:
-        """Largest tension of each cable (n,), N."""
-        return self.settled("tension_max", team)
-
-    def tension_floors(self, team: Team) -> Vector:
-        """Least tension of each cable (n,), N."""
-        return self.settled("tension_min", team)
-
-    def drone_distances(self, team: Team) -> Vector:
-        """Least distance of each drone (n,), m: two keep the mean of theirs; 0: not limited."""
-        return self.settled("min_distance", team)
-
-    def cable_distances(self, team: Team) -> Vector:
-        """Least distance of each drone (n,) from the others' cables, m; 0: not limited."""
-        return self.settled("cable_distance", team)
 
     def gap(self, team: Team) -> float:
         """Least distance between two cables, m; 0: not limited."""
@@ -927,7 +859,7 @@ class SafeWrench(AllocatorPart):
         n = team.n
         directions, tensions = self.formation(team)
         span, axis = spanned(team)
-        sigma = max(_share(team), 1e-6)
+        sigma = max(share_of(team), 1e-6)
         size = max(float(np.abs(team.levers).max()), 1e-3)
         most = self.thrust_limits(team)
         flying = bool(np.isfinite(most).any()) or self.max_tilt_deg is not None
@@ -979,11 +911,6 @@ class SafeWrench(AllocatorPart):
 
     def carry_over(self, old: Vector, fresh: Vector, places: NDArray[np.int64]) -> Vector:
         return fresh  # all that is remembered is how far pairs are apart
-
-
-def _share(team: Team) -> float:
-    """A cable's share of the load's weight, N."""
-    return team.load_mass * max(team.gravity, 1e-3) / team.n
 
 
 def outward(team: Team) -> Array:

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from colift.control.load_control._upright import keep_upright
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
 from colift.control.margins import Hanging
 from colift.control.tuning import LEAN, Delays
@@ -56,12 +57,7 @@ def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         e_dot = load[1, k] - reference[1, k]
         known = m_hat * g if k == 2 else memory[lean + k]
         u_L[k] = known + m_hat * reference[2, k] - k_p * e - k_d * e_dot
-    # Keep the cables taut and the formation upright: a force up, within a cone.
-    u_L[2] = max(u_L[2], 0.3 * m_hat * g)
-    across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
-    if across > tangent * u_L[2]:
-        u_L[0] *= tangent * u_L[2] / across
-        u_L[1] *= tangent * u_L[2] / across
+    keep_upright(m_hat * g, tangent, u_L)
     grown = 1.0 + memory[M.mass]
     for k in range(3):
         steady = m * g * grown if k == 2 else memory[lean + k]

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from colift.control.load_control._upright import keep_upright
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
 from colift.control.margins import Hanging
 from colift.control.tuning import Delays, sway
@@ -34,12 +35,7 @@ def _balance(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     for k in range(3):
         memory[push + k] += share * (forces[last, k] - memory[push + k])
         u_L[k] = m * (reference[2, k] + (g if k == 2 else 0.0)) - memory[push + k]
-    # Keep the cables taut and the formation upright: a force up, within a cone.
-    u_L[2] = max(u_L[2], 0.3 * m * g)
-    across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
-    if across > params[P.tangent] * u_L[2]:
-        u_L[0] *= params[P.tangent] * u_L[2] / across
-        u_L[1] *= params[P.tangent] * u_L[2] / across
+    keep_upright(m * g, params[P.tangent], u_L)
     for k in range(3):
         writes.steady_force[k] = u_L[k]
 

@@ -18,6 +18,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from colift.control.load_control._upright import keep_upright
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
 from colift.control.tuning import Delays, sway
 from colift.kernel.jit import kernel
@@ -101,12 +102,7 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         e_v = load[1, k] + speed[k] - reference[1, k] - speed_d[k]
         writes.steady_force[k] = planned
         u_L[k] = planned - params[P.k_p] * e_x - params[P.k_d] * e_v
-    # Keep the cables taut and the formation upright: a force up, within a cone.
-    u_L[2] = max(u_L[2], 0.3 * m * g)
-    across = math.sqrt(u_L[0] * u_L[0] + u_L[1] * u_L[1])
-    if across > params[P.tangent] * u_L[2]:
-        u_L[0] *= params[P.tangent] * u_L[2] / across
-        u_L[1] *= params[P.tangent] * u_L[2] / across
+    keep_upright(m * g, params[P.tangent], u_L)
 
 
 class Pose(LoadControlPart, Delays):
@@ -137,6 +133,11 @@ class Pose(LoadControlPart, Delays):
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "load_control")
+        team = mission.team
+        if team.body is not None and team.n < 3:
+            free = "no attitude" if team.n == 1 else "no turn about the line through their ends"
+            message = f"wants an attitude, and {team.n} cable{'s' * (team.n > 1)} hold {free}: there the load swings freely"
+            yield "kind", message
 
     def params(self, team: Team) -> Vector:
         body = team.body

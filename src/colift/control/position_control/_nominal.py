@@ -14,6 +14,7 @@ from colift.kernel.jit import aside
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion, wrench
 from colift.kernel.math.small import cross, matrix_times
+from colift.kernel.math.sphere import FOLLOW
 from colift.part import Vector
 from colift.team import Team
 from colift.team.plan import plan, spanned
@@ -84,3 +85,17 @@ def plan_pulls(n, reference, attitude, rates, dt, keep, params, memory):  # type
             memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend_k
             memory[o + 3 + k] = rate
             memory[o + k] = w[3 * i + k]
+
+
+@aside
+def keep_courses(n, state, memory, first, width):  # type: ignore[no-untyped-def]
+    """After the team has changed: let the cables go on from where they are led, and the correction to a new plan fade.
+
+    The directions, with rates, that are led stand ``width`` apart from ``first`` on, as :func:`colift.control.position_control._cable.lead` keeps them.
+    """
+    for i in range(n):
+        w, o = state.shape[0] - 9 * n + 9 * i, first + width * i
+        T = (state[w] ** 2 + state[w + 1] ** 2 + state[w + 2] ** 2) ** 0.5
+        for k in range(3):
+            memory[o + FOLLOW + k] = memory[o + k] - state[w + k] / max(T, 1e-9)
+            memory[o + FOLLOW + 3 + k] = memory[o + 3 + k]

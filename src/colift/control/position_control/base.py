@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from colift.control.margins import Places
 from colift.kernel.ports import PORTS
 from colift.part import Part
 from colift.team import Team
+from colift.team.geometry import Array
 
 SIGNATURE = PORTS["position_control"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
 Called at the layer's own period, ``now.dt``. Attitudes and rates are as old as their sensors make them.
 """
+
+Pose = tuple[Array, Array, Array]
+"""Motion (4, 3), attitude (4,) and rates with two derivatives (3, 3) that are wanted of a load."""
 
 
 class PositionControlPart(Part):
@@ -27,6 +32,10 @@ class PositionControlPart(Part):
 
     def places(self, team: Team, axis: int) -> Places | None:
         """The law for small errors along a horizontal axis of the world, 0 or 1; None where there is no such law."""
+        return None
+
+    def planned_pulls(self, team: Team, poses: Sequence[Pose]) -> Array | None:
+        """Forces (poses, n, 3), N, by which it leads the cables of a rigid load along wanted poses; None where it plans none."""
         return None
 
     def axis_delay(self) -> float:

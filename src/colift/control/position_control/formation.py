@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -16,8 +16,8 @@ from colift.control.position_control._cable import (
     lead,
     swing,
 )
-from colift.control.position_control._nominal import numbers, plan_pulls, room
-from colift.control.position_control.base import SIGNATURE, PositionControlPart
+from colift.control.position_control._nominal import keep_courses, numbers, plan_pulls, room
+from colift.control.position_control.base import SIGNATURE, Pose, PositionControlPart
 from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
@@ -25,6 +25,7 @@ from colift.kernel.math import rotors
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
 from colift.team import Team
+from colift.team.geometry import Array
 
 PARAMS = Layout(
     team={
@@ -94,9 +95,12 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     stands = sees.standing[n] != 0.0
     if params[P.rigid] > 0.0:
         own, kept = params[P.rows + P.width * n :], memory[M.rows + M.width * n :]
+        replanned = kept[0] == 0.0 and memory[M.rows + M.started] != 0.0
         plan_pulls(
             n, reference, sees.reference_attitude, sees.reference_rates, dt, keep_snap, own, kept
         )  # fmt: skip
+        if replanned:
+            keep_courses(n, kept, memory, M.rows + M.direction, M.width)
         if math.isnan(nominal[0, 0, 0]):
             nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
     height = 0.0
@@ -260,6 +264,16 @@ class Formation(PositionControlPart, Delays):
             most=self.settled("max_thrust", team), drag=self.settled("rotor_drag", team),
         )  # fmt: skip
         return np.concatenate([own, numbers(team)])
+
+    def planned_pulls(self, team: Team, poses: Sequence[Pose]) -> Array | None:
+        if team.body is None:
+            return None
+        own, kept = numbers(team), np.zeros(room(team))
+        found = np.empty((len(poses), team.n, 3))
+        for row, (motion, attitude, rates) in zip(found, poses, strict=True):
+            plan_pulls(team.n, motion, attitude, rates, 1.0, 0.0, own, kept)
+            row[:] = kept[-9 * team.n :].reshape(team.n, 3, 3)[:, 0]
+        return found
 
     def memory(self, team: Team) -> Vector:
         return np.concatenate([super().memory(team), np.zeros(room(team))])
