@@ -100,18 +100,20 @@ _decide = agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
-def _follow_clock(course, rate, shift, bus):  # type: ignore[no-untyped-def]
+def _follow_clock(course, rate, shift, rigid, bus):  # type: ignore[no-untyped-def]
     """From derivatives along the reference's clock, which runs at this rate, to those in time; and shifted."""
     reference, nominal = bus.reference, bus.nominal_forces
-    for j in range(4):
-        bus.reference_attitude[j] = course.reference_attitude[j]
+    if rigid:
+        for j in range(4):
+            bus.reference_attitude[j] = course.reference_attitude[j]
+        for m in range(3):
+            for j in range(3):
+                bus.reference_rates[m, j] = rate ** (m + 1) * course.reference_rates[m, j]
     power = 1.0
     for m in range(4):
         for j in range(3):
             reference[m, j] = power * course.reference[m, j] + shift[m, j]
         if m < 3:
-            for j in range(3):
-                bus.reference_rates[m, j] = power * rate * course.reference_rates[m, j]
             for i in range(nominal.shape[0]):
                 for j in range(3):
                     nominal[i, m, j] = power * course.nominal_forces[i, m, j]
@@ -148,7 +150,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             )  # fmt: skip
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
-        _follow_clock(wires.reference.writes, bus.clock[1], bus.reference_shift, bus)
+        _follow_clock(wires.reference.writes, bus.clock[1], bus.reference_shift, rigid, bus)
         ends_of(bus.reference, bus.wanted_ends)
         if rigid:
             add_wanted_arms(

@@ -101,9 +101,9 @@ def runge_kutta(stage, size, dt, begin, slope, total, y):  # type: ignore[no-unt
 
 
 @inline
-def normalise(n, y):  # type: ignore[no-untyped-def]
-    """Pull the quaternions back to unit norm; the load's stands as a drone's does."""
-    for i in range(n + 1):
+def normalise(n, params, y):  # type: ignore[no-untyped-def]
+    """Pull the quaternions back to unit norm; that of a rigid load stands as a drone's does."""
+    for i in range(0 if params[P.rigid] > 0.0 else 1, n + 1):
         o = DRONE * i + 6
         norm = math.sqrt(
             y[o] * y[o] + y[o + 1] * y[o + 1] + y[o + 2] * y[o + 2] + y[o + 3] * y[o + 3]

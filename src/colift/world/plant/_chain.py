@@ -287,7 +287,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                     tensions[i] = T[i]
                 if T[i] == 0.0 and attached[i] > 0.0:
                     slack_times[i] += h
-        normalise(n, y)
+        normalise(n, params, y)
         if params[P.ground] > 0.0:
             settle(n, begin, y, w, params, anchors, writes.touch_speeds)
 

@@ -229,7 +229,7 @@ def tighten(n, y, held, params, lengths, T, alpha, b):  # type: ignore[no-untype
 @inline
 def project(n, y, held, params, lengths, rates, T, alpha, b):  # type: ignore[no-untyped-def]
     """Pull the held drones back to their distance and the velocities across it; keep momentum."""
-    normalise(n, y)
+    normalise(n, params, y)
     lines(n, y, params, alpha, b)
     tighten(n, y, held, params, lengths, T, alpha, b)
     lines(n, y, params, alpha, b)
