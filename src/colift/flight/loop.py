@@ -25,6 +25,7 @@ from colift.catalogue import LAYERS
 from colift.control.allocation.base import INFO_SIZE, Status
 from colift.errors import ColiftError
 from colift.flight import agents
+from colift.kernel.by_reference import signals_type
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
 from colift.kernel.load import add_arms, add_wanted_arms, ends_of, is_rigid
 from colift.kernel.math.winch import paid_out
@@ -80,7 +81,7 @@ SIGNATURE = i8(
     i8,
     i8,
     types.UniTuple(PORTS["disturbance"].type, MAX_DISTURBANCES),
-    named([type_of(name) for name in Common._fields], Common),
+    signals_type(Common, [type_of(name) for name in Common._fields]),
     matrix,
     matrix,
 )

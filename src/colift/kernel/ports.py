@@ -27,6 +27,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
+from colift.kernel.by_reference import signals_type
 from colift.kernel.jit import address_of, f8, i8, u1, vector, void
 from colift.kernel.signals import HIDDEN, LEGEND, OF_ONE, Signal, named_tuple
 
@@ -168,7 +169,7 @@ class Port:
         keep(self, "Writes", _tuple(f"{_words(self.name)}Writes", self.writes))
         returns = i8 if self.answers else void
         sees, writes = (
-            named((_array(self.table[name]) for name in made._fields), made)
+            signals_type(made, (_array(self.table[name]) for name in made._fields))
             for made in (self.Sees, self.Writes)
         )
         arguments = (NOW_TYPE, sees, vector, vector, writes)

@@ -1,0 +1,115 @@
+"""Signals go to compiled code by reference: of the tuples that a port's kernels see and write, only their place is passed.
+
+A kernel looks up what it uses. By value each call would hand over every array of the port, which costs more than small
+kernels take, and each signal that is added to a port would cost all of its kernels more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import (
+    NativeValue,
+    infer_getattr,
+    lower_cast,
+    lower_getattr_generic,
+    models,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+
+
+class Signals(types.Type):
+    """Numba's type of one class of named tuples of arrays, which stand where they are for as long as the code runs."""
+
+    def __init__(self, made: Any, each: Iterable[Any]) -> None:
+        self.made, self.each = made, tuple(each)
+        super().__init__(f"{made.__module__}.{made.__name__}")
+
+    @property
+    def value(self) -> Any:
+        """Type of the same tuple by value."""
+        return types.BaseTuple.from_types(self.each, self.made)
+
+    def can_convert_from(self, typingctx: Any, other: Any) -> Any:
+        """A tuple of this class that compiled code has made is one."""
+        return Conversion.safe if getattr(other, "instance_class", None) is self.made else None
+
+
+def signals_type(made: Any, each: Iterable[Any]) -> Signals:
+    """The type of a class of named tuples whose fields are arrays of these types; that is what Numba takes each for from now on."""
+    found = Signals(made, each)
+
+    def typeof(value: Any, context: Any) -> Any:
+        return found
+
+    register: Any = typeof_impl.register
+    register(made)(typeof)
+    return found
+
+
+@register_model(Signals)
+class _Model(models.PrimitiveModel):
+    """Where the tuple stands."""
+
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(  # type: ignore[no-untyped-call]
+            dmm, fe_type, dmm.lookup(fe_type.value).get_value_type().as_pointer()
+        )
+
+    def from_argument(self, builder: Any, value: Any) -> Any:
+        # Nobody writes there while a kernel runs: what it looks up in a loop, it may look up before.
+        if isinstance(value, ir.Argument):
+            value.add_attribute("noalias")
+            value.add_attribute("nonnull")
+        return value
+
+
+def _put(context: Any, builder: Any, signals: Signals, value: Any) -> Any:
+    """Let a tuple by value stand somewhere."""
+    place = cgutils.alloca_once(builder, context.get_value_type(signals.value))
+    for i in range(len(signals.each)):
+        builder.store(builder.extract_value(value, i), cgutils.gep_inbounds(builder, place, 0, i))
+    return place
+
+
+@unbox(Signals)  # type: ignore[untyped-decorator]
+def _unbox(typ: Signals, obj: Any, c: Any) -> Any:
+    by_value = c.unbox(typ.value, obj)
+    place = _put(c.context, c.builder, typ, by_value.value)
+    return NativeValue(place, is_error=by_value.is_error, cleanup=by_value.cleanup)
+
+
+@lower_cast(types.BaseNamedTuple, Signals)  # type: ignore[untyped-decorator]
+def _cast(context: Any, builder: Any, fromty: Any, toty: Signals, value: Any) -> Any:
+    return _put(context, builder, toty, context.cast(builder, value, fromty, toty.value))
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    key = Signals
+
+    def generic_resolve(self, signals: Any, attr: str) -> Any:  # type: ignore[override]
+        if attr in signals.made._fields:
+            return signals.each[signals.made._fields.index(attr)]
+        return None
+
+
+@lower_getattr_generic(Signals)  # type: ignore[untyped-decorator]
+def _look_up(context: Any, builder: Any, typ: Signals, place: Any, attr: str) -> Any:
+    i = typ.made._fields.index(attr)
+    array = context.make_array(typ.each[i])(
+        context, builder, builder.load(cgutils.gep_inbounds(builder, place, 0, i))
+    )
+    # Who holds the tuple keeps the arrays: here nobody counts who refers to them.
+    for owner in ("meminfo", "parent"):
+        nobody = cgutils.get_null_value(getattr(array, owner).type)
+        setattr(array, owner, nobody)
+    return array._getvalue()
