@@ -121,7 +121,7 @@ def test_energy_and_momenta_are_conserved(plant):
         return rig.energy() + energy, rig.momentum(), rig.angular_momentum() + turning
 
     energy, momentum, angular = kept()
-    rig.step(dt=0.0005, count=2000)
+    rig.step(dt=0.00025, count=4000)
     later = kept()
     if isinstance(plant, SlackCables):  # a catch takes energy away
         assert rig.slack_times.max() > 0.0
