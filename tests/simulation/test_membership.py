@@ -29,12 +29,23 @@ def test_whoever_does_not_carry_is_judged_lost_and_noted(team):
     assert membership.found == [(4.0, 2)]
 
 
+def moment(bus, parts, clock):
+    return {
+        "before": [0, 1, 2],
+        "bus": bus,
+        "parts": parts,
+        "time": 4.0,
+        "clock": clock,
+        "end": 10.0,
+    }
+
+
 def test_three_carry_on_and_two_bring_it_down(team):
     membership, bus, parts = team
-    now = {"drones": [0, 1, 2], "bus": bus, "parts": parts, "time": 4.0, "clock": 3.0}
-    assert membership.left_with([0, 1, 2], **now) == {}
+    now = moment(bus, parts, 3.0)
+    assert membership.go_on([0, 1, 2], **now) == {}
     assert membership.descent == ""
-    follows = membership.left_with([0, 2], **now)
+    follows = membership.go_on([0, 2], **now)
     assert follows == {
         "reference": Descent(position=(1.0, 2.0, 3.0), velocity=(0.1, 0.0, 0.0), at=3.0)
     }
@@ -44,8 +55,8 @@ def test_three_carry_on_and_two_bring_it_down(team):
 
 def test_who_descends_already_goes_on_descending(team):
     membership, bus, parts = team
-    now = {"drones": [0, 1, 2], "bus": bus, "parts": parts, "time": 4.0, "clock": 4.0}
-    assert membership.left_with([0, 2], **now)
+    now = moment(bus, parts, 4.0)
+    assert membership.go_on([0, 2], **now)
     reason = membership.descent
-    assert membership.left_with([0], **now) == {}
+    assert membership.go_on([0], **now) == {}
     assert membership.descent == reason

@@ -14,13 +14,14 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from colift.control.allocation.base import AllocatorPart
 from colift.control.reference.base import ReferencePart
 from colift.errors import ColiftError, Problem, SettingError
 from colift.flight.leg import Leg, Stretch, due_rows, places_of
 from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
 from colift.flight.membership import Membership
 from colift.interrupts import heard
-from colift.kernel.math import winch
+from colift.kernel.math import leaning, winch
 from colift.kernel.ports import PORTS, hold, hold_answer
 from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, SIGNALS, columns, make_bus
 from colift.mission.mission import Mission
@@ -31,6 +32,8 @@ from colift.record.ends import ends_of, turned_ends
 from colift.record.recording import Recording
 from colift.team import Team, contact
 from colift.team.geometry import matrix_of, min_norm_tensions, widest_gap, zero_yaw_quaternion
+from colift.team.load import from_to
+from colift.team.plan import shares
 from colift.wording import numbers
 from colift.world.disturbance.base import DisturbancePart
 from colift.world.fault.base import LOAD, Change
@@ -88,6 +91,7 @@ class Flight:
         start, thrusts = start_state(mission)
         self._begin_leg(drones, self._fresh_memory(drones, start))
         bus = self.bus
+        self._form()
         self._refer_anew()
         bus.reference[:] = self.wires.reference.writes.reference
         bus.reference_attitude[:] = start.load_attitude
@@ -293,6 +297,7 @@ class Flight:
                 now[team.n :] = before[len(old.drones) :]
             else:
                 now[:] = before
+        self._form()
         bus.desired_directions[new] = bus.received_directions[new] = directions[new]
         bus.thrusts[new] = team.masses[new] * team.gravity
         if bus.reeled.any():
@@ -304,6 +309,13 @@ class Flight:
                     now[:] = before
         else:
             self._refer_anew()
+
+    def _form(self) -> None:
+        """Let a rigid load hang in the allocator's formation."""
+        leg, allocation = self._legs[-1], self._parts["allocation"].of(self.drones)
+        assert isinstance(allocation, AllocatorPart)
+        if leg.team.body is not None:
+            leg.bus.formations[:] = shares(leg.team, *allocation.formation(leg.team))[:, None]
 
     def _refer_anew(self) -> None:
         """Write what the reference wants now: one that asks for no attitude would leave what stood there before it."""
@@ -424,12 +436,23 @@ class Flight:
 
     def lose(self, lost: list[int]) -> None:
         """Go on without these drones; if the others cannot hold the load in hover, bring it down."""
-        drones, time = self.drones, self.time
-        rest = [drone for drone in drones if drone not in lost]
-        self._parts |= self.membership.left_with(
-            rest, drones, self.bus, self._parts, time=time, clock=self.clock
-        )
-        self.regroup(rest)
+        rest = [drone for drone in self.drones if drone not in lost]
+        self._go_on(rest)
+
+    def _go_on(self, drones: list[int]) -> None:
+        """With these drones, as the outlook for them is: how the load hangs, the formation, the pace, or down."""
+        self._parts |= self.membership.go_on(
+            drones, self.drones, self.bus, self._parts, time=self.time, clock=self.clock,
+            end=self.mission.timing.duration,
+        )  # fmt: skip
+        self.regroup(drones)
+        bus, found, now = self.bus, self.membership.outlook, self.time
+        if self.membership.formation is not None:
+            bus.formations[:, 0] = self.membership.formation
+        now_wanted = self.wires.reference.writes.reference_attitude
+        before = from_to(now_wanted, bus.reference_attitude)
+        bus.lean[:] = leaning.lean_of(before, found.hang, now, found.within)
+        leaning.run_at(bus.pace, found.pace, now)
 
     def _advance(self, stop: int) -> None:
         """Run the loop up to a step, or until it ends early; keep what it recorded."""
@@ -514,7 +537,7 @@ class Flight:
             if due.value in drones and len(drones) > 1:
                 self.lose([due.value])
         elif due.of_team == "join":
-            self.regroup(sorted([*drones, due.value]))
+            self._go_on(sorted([*drones, due.value]))
         elif due.of_winches:
             self._wind(due)
         else:
@@ -557,7 +580,7 @@ class Flight:
         self.membership.team = replace(self.membership.team, cable_lengths=lengths)
 
     def _fresh_memory(self, drones: list[int], start: Start) -> dict[str, Vector]:
-        team = self.mission.team.of(drones)
+        team = self._team(drones)
         memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
         true = self.mission.true_bodies.of(drones)
         real = replace(team, cable_lengths=true.cable_lengths, body=true.body)
@@ -565,7 +588,7 @@ class Flight:
 
     def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
         """From here on these drones of the mission fly; every layer is bound to their team."""
-        old, team = self._legs[-1] if self._legs else None, self.mission.team.of(drones)
+        old, team = self._legs[-1] if self._legs else None, self._team(drones)
         disturbances = []
         for place, (number, part) in enumerate(self._disturbances.items()):
             remembered = part.memory(team)
@@ -583,6 +606,10 @@ class Flight:
         parts = {layer: type(part) for layer, part in self._parts.items()}
         wired = circuit(bus, parts, self._keys, params, memory, disturbances)
         self._legs.append(Leg(drones, team, bus, wired, self._step))
+
+    def _team(self, drones: list[int]) -> Team:
+        """These drones and their load as the controllers are told, hanging as it does on them."""
+        return self.membership.outlook.flown(self.mission.team.of(drones))
 
     def _true_team(self, drones: list[int]) -> Team:
         bodies = replace(self.mission.true_bodies.of(drones), load_mass=self._load_mass)
@@ -652,8 +679,10 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
     pose = mission.reference.pose(team)
     attitude = pose[1]
     if mission.start.directions is None:
-        pulls = mission.position_control.of(drones).planned_pulls(team, [pose])
-        if pulls is not None:
+        hover = shares(team, *mission.allocation.of(drones).formation(team))
+        planned = mission.position_control.of(drones).planned_pulls(team, [pose], [hover])
+        if planned is not None:
+            pulls, _ = planned
             directions = pulls[0] / np.linalg.norm(pulls[0], axis=1, keepdims=True)
     levers = team.levers @ matrix_of(attitude).T
     tensions = np.maximum(min_norm_tensions(directions, weight, levers), 0.0)

@@ -28,6 +28,7 @@ from colift.flight import agents
 from colift.kernel.by_reference import signals_type
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
 from colift.kernel.load import add_arms, add_wanted_arms, ends_of, is_rigid
+from colift.kernel.math.leaning import leaned
 from colift.kernel.math.winch import paid_out
 from colift.kernel.ports import MAX_DISTURBANCES, PORTS, Wire, named, type_of
 from colift.kernel.signals import CYCLE_SIGNALS, named_tuple
@@ -48,7 +49,7 @@ Common = named_tuple(
     "Common",
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
-        "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "reference",
+        "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "clock_bends", "lean", "formations", "formation", "reference",
         "reference_attitude", "reference_rates", "nominal_forces", "attachments",
         "estimated_load", "estimated_load_attitude", "estimated_load_rates", "estimated_ends", "wanted_ends", "reference_shift",
         "lift_share", "unhooked", "attached", "winches", "reeled",
@@ -101,24 +102,42 @@ _decide = agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
-def _follow_clock(course, rate, shift, rigid, bus):  # type: ignore[no-untyped-def]
-    """From derivatives along the reference's clock, which runs at this rate, to those in time; and shifted."""
-    reference, nominal = bus.reference, bus.nominal_forces
+def _follow_clock(course, t, rigid, bus):  # type: ignore[no-untyped-def]
+    """From derivatives along the reference's clock to those in time; shifted, and leaning where the load is rigid.
+
+    Of ``x(c(t))`` the derivatives are ``x' c'``, ``x" c'^2 + x' c"`` and ``x"' c'^3 + 3 x" c' c" + x' c"'``.
+    """
+    r, r1, r2 = bus.clock[1], bus.clock_bends[0], bus.clock_bends[1]
+    wanted, shift = course.reference, bus.reference_shift
+    for j in range(3):
+        x1, x2, x3 = wanted[1, j], wanted[2, j], wanted[3, j]
+        bus.reference[0, j] = wanted[0, j] + shift[0, j]
+        bus.reference[1, j] = r * x1 + shift[1, j]
+        bus.reference[2, j] = r * r * x2 + r1 * x1 + shift[2, j]
+        bus.reference[3, j] = r * r * r * x3 + 3.0 * r * r1 * x2 + r2 * x1 + shift[3, j]
+    for i in range(bus.nominal_forces.shape[0]):
+        for j in range(3):
+            w1, w2 = course.nominal_forces[i, 1, j], course.nominal_forces[i, 2, j]
+            bus.nominal_forces[i, 0, j] = course.nominal_forces[i, 0, j]
+            bus.nominal_forces[i, 1, j] = r * w1
+            bus.nominal_forces[i, 2, j] = r * r * w2 + r1 * w1
     if rigid:
         for j in range(4):
             bus.reference_attitude[j] = course.reference_attitude[j]
-        for m in range(3):
-            for j in range(3):
-                bus.reference_rates[m, j] = rate ** (m + 1) * course.reference_rates[m, j]
-    power = 1.0
-    for m in range(4):
         for j in range(3):
-            reference[m, j] = power * course.reference[m, j] + shift[m, j]
-        if m < 3:
-            for i in range(nominal.shape[0]):
-                for j in range(3):
-                    nominal[i, m, j] = power * course.nominal_forces[i, m, j]
-        power *= rate
+            w0, w1, w2 = (
+                course.reference_rates[0, j],
+                course.reference_rates[1, j],
+                course.reference_rates[2, j],
+            )
+            bus.reference_rates[0, j] = r * w0
+            bus.reference_rates[1, j] = r * r * w1 + r1 * w0
+            bus.reference_rates[2, j] = r * r * r * w2 + 3.0 * r * r1 * w1 + r2 * w0
+        share = leaned(bus.lean, t, bus.reference_attitude, bus.reference_rates)
+        for i in range(bus.formation.shape[0]):
+            for j in range(3):
+                before, after = bus.formations[i, 0, j], bus.formations[i, 1, j]
+                bus.formation[i, j] = before + share * (after - before)
 
 
 @kernel(SIGNATURE, counted=False)
@@ -151,7 +170,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             )  # fmt: skip
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
-        _follow_clock(wires.reference.writes, bus.clock[1], bus.reference_shift, rigid, bus)
+        _follow_clock(wires.reference.writes, t, rigid, bus)
         ends_of(bus.reference, bus.wanted_ends)
         if rigid:
             add_wanted_arms(

@@ -10,10 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from colift.control.allocation.base import AllocatorPart
+from colift.control.reference.base import ReferencePart
 from colift.control.reference.descent import Descent
+from colift.mission.outlook import Outlook, bound, outlook
 from colift.part import Part
 from colift.team import Team
-from colift.world.actuation.base import ActuationPart
+from colift.team.geometry import Array
+from colift.team.plan import taken_over
 
 
 @dataclass
@@ -28,12 +31,18 @@ class Membership:
         Drones that were judged lost by the mission's ``detection``, s.
     descent : str
         Why the load is brought down because the drones left cannot carry it; empty while they can.
+    outlook : Outlook
+        How the load hangs on those that fly, and at what pace the reference goes on.
+    formation : array, optional
+        Of a rigid load: cables' forces (n, 3) from which those that fly now went on; see :func:`colift.team.plan.shares`.
 
     """
 
     team: Team
     found: list[tuple[float, int]] = field(default_factory=list)
     descent: str = ""
+    outlook: Outlook = field(default_factory=Outlook)
+    formation: Array | None = None
 
     def judged_lost(self, drones: list[int], carrying: Any, time: float) -> list[int]:
         """Those of ``drones`` whose ``carrying`` (n,) is 0 now; they are noted in :attr:`found`."""
@@ -41,35 +50,52 @@ class Membership:
         self.found += [(time, drone) for drone in lost]
         return lost
 
-    def left_with(
+    def go_on(
         self,
-        rest: list[int],
         drones: list[int],
+        before: list[int],
         bus: Any,
         parts: Mapping[str, Part],
         *,
         time: float,
         clock: float,
+        end: float,
     ) -> dict[str, Part]:
-        """Parts that take the place of others once only ``rest`` of ``drones`` fly: a descent if they cannot carry.
+        """Parts that take the place of others once ``drones`` fly instead of those ``before``: a descent if they cannot carry.
 
-        ``bus`` holds the signals of ``drones``; ``time`` is the flight's, ``clock`` the reference's, s.
+        ``bus`` holds the signals of those before; ``time`` is the flight's, ``clock`` the reference's, which is flown until ``end``, s.
         """
-        if self.descent or not (reason := self.cannot_carry(rest, drones, bus, parts)):
+        team = self.team.of(drones)
+        self.formation = None
+        if self.descent or (team.body is None and not {*before} - {*drones}):
             return {}
-        self.descent = f"descended from t = {time:g} s: {reason}"
+        begin = None
+        if team.body is not None:
+            self.formation = self._taken_over(drones, before, bus, parts)
+            begin = bus.reference_attitude, self.formation
+        flying = [before.index(drone) for drone in drones if drone in before]
+        found = outlook(
+            team, bound(parts, drones), bus.desired_directions[flying], clock, end, begin
+        )
+        if found.carries:
+            self.outlook, reference = found, parts["reference"]
+            assert isinstance(reference, ReferencePart)
+            return {"reference": reference.upright()} if found.upright else {}
+        if not {*before} - {*drones}:  # who has joined is no reason to come down
+            return {}
+        self.outlook = found._replace(pace=1.0)
+        self.descent = f"descended from t = {time:g} s: {found.reason}"
         position, velocity = bus.reference[:2].tolist()
         return {"reference": Descent(position=position, velocity=velocity, at=clock)}
 
-    def cannot_carry(
-        self, rest: list[int], drones: list[int], bus: Any, parts: Mapping[str, Part]
-    ) -> str:
-        """Why ``rest`` cannot carry the load on; empty when they can, as far as their models say."""
-        team = self.team.of(rest)
-        actuation, allocation = parts["actuation"].of(rest), parts["allocation"].of(rest)
-        assert isinstance(actuation, ActuationPart)
+    def _taken_over(
+        self, drones: list[int], before: list[int], bus: Any, parts: Mapping[str, Part]
+    ) -> Array:
+        """The formation that drones go on from: on the cables that stay as they are, on new ones as planned."""
+        team, allocation = self.team.of(drones), parts["allocation"].of(drones)
         assert isinstance(allocation, AllocatorPart)
-        directions = bus.desired_directions[[drones.index(drone) for drone in rest]]
-        problems = [message for _, message in actuation.conflicts(team)]
-        problems += allocation.cannot_hold(team, actuation.thrust_limits(team), directions)
-        return "; ".join(problems)
+        directions, _ = allocation.formation(team)
+        for row, drone in zip(directions, drones, strict=True):
+            if drone in before:
+                row[:] = bus.desired_directions[before.index(drone)]
+        return taken_over(team, directions, bus.reference[2], bus.reference_attitude)

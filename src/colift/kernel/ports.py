@@ -237,7 +237,7 @@ PORTS: dict[str, Port] = {
             "supervision",
             sees=(
                 *_named("estimated"), "estimated_ends", "estimated_forces", "estimated_wind", "thrusts",
-                "reference", "reeled", "found_lengths", *_RECEIVED,
+                "reference", "pace", "reeled", "found_lengths", *_RECEIVED,
             ),
         ),
         Port("reference", sees=()),
@@ -247,7 +247,7 @@ PORTS: dict[str, Port] = {
         ),
         Port(
             "allocation",
-            sees=("force", "moment", *_WANTED, "estimated_load_attitude", "nominal_forces"),
+            sees=("force", "moment", *_WANTED, "estimated_load_attitude", "nominal_forces", "formation"),
             answers=True,
         ),
         Port("link", sees=("desired_tensions", "desired_directions")),
@@ -269,7 +269,7 @@ PORTS: dict[str, Port] = {
             "position_control",
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
-                *_WANTED, "wanted_ends", "nominal_forces", "standing", "spans", "courses", "reeled",
+                *_WANTED, "wanted_ends", "nominal_forces", "formation", "standing", "spans", "courses", "reeled",
                 "found_lengths",
                 *_RECEIVED,
             ),

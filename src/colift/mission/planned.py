@@ -7,21 +7,26 @@ goes slack; where little is asked of a cable, it swings its drone around. No con
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from colift.control.position_control.base import PositionControlPart
+from colift.control.allocation.base import AllocatorPart
+from colift.control.position_control.base import Pose, PositionControlPart
 from colift.control.reference.base import ReferencePart
 from colift.errors import Problem
 from colift.mission.schema import Frame
 from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array, matrix_of
+from colift.team.load import LEVEL, times_of
+from colift.team.plan import shares
 
 ROOM = 0.65
 """Share of the rotors' angular acceleration that a plan may ask for: the rest is for corrections."""
+TAUT = 0.1
+"""Least that a plan may ask of a cable, over its part of the force: with less it is slack at the first gust."""
 STEP, MOST = 0.02, 1500
 """Time between two moments that are looked at, s, unless there would be more than so many."""
 
@@ -31,28 +36,72 @@ class Planned(NamedTuple):
 
     tensions: Array
     """Of the cables (times, n), N."""
+    taut: Array
+    """What is asked of them over their part of the force (times, n)."""
     turning: Array
     """Angular acceleration of each drone's thrust (times, n), rad/s^2; NaN at both ends."""
 
 
-def planned(
-    team: Team, reference: ReferencePart, position_control: PositionControlPart, times: Array
-) -> Planned | None:
-    """What is planned of a rigid load's cables and drones at times that are evenly spaced; None where nothing is."""
+class Demand(NamedTuple):
+    """Where most is asked of a drone, along a reference."""
+
+    share: float
+    """Of the angular acceleration that its rotors give."""
+    turning: float
+    """Angular acceleration of its thrust, rad/s^2, and how much its rotors give."""
+    limit: float
+    time: float
+    """Of the reference, s."""
+    drone: int
+    """In the team."""
+    taut: float
+    """Least that is asked of a cable, over its part of the force; below 0 it would have to push."""
+    slack: tuple[float, int]
+    """When, s, and of which."""
+
+    @property
+    def within(self) -> bool:
+        """Whether drones can do it, and cables."""
+        return self.share <= ROOM and self.taut >= TAUT
+
+
+def wanted(
+    team: Team, reference: ReferencePart, first: float, last: float
+) -> tuple[Array, list[Pose]]:
+    """Times of a reference, evenly spaced, and the poses that it wants there; of a load that hangs leaning, leaning."""
+    times = np.linspace(first, last, min(MOST, max(8, round((last - first) / STEP))))
     poses = [reference.pose(team, float(time)) for time in times]
-    pulls = position_control.planned_pulls(team, poses)
-    if pulls is None or team.body is None:
+    if team.body is None or np.array_equal(team.body.hang, LEVEL):
+        return times, poses
+    lean = matrix_of(team.body.hang)
+    return times, [(x, times_of(q, team.body.hang), rates @ lean) for x, q, rates in poses]
+
+
+def planned(
+    team: Team,
+    position_control: PositionControlPart,
+    times: Array,
+    poses: Sequence[Pose],
+    formations: Sequence[Array],
+    pace: float = 1.0,
+) -> Planned | None:
+    """What is planned of a rigid load's cables and drones at times that are evenly spaced, at this pace; None where nothing is."""
+    powers = pace ** np.arange(4.0)[:, None]
+    poses = [(powers * x, q, powers[1:] * rates) for x, q, rates in poses]
+    found = position_control.planned_pulls(team, poses, formations)
+    if found is None or team.body is None:
         return None
+    pulls, taut = found
     turned = [matrix_of(attitude) for _, attitude, _ in poses]
     arms = np.array([team.body.attachments @ R.T for R in turned])
     ends = np.array([motion[0] for motion, _, _ in poses])[:, None] + arms
-    step = float(times[1] - times[0])
+    step = float(times[1] - times[0]) / pace
     sizes = np.linalg.norm(pulls, axis=2)
     places = ends - team.cable_lengths[:, None] * pulls / sizes[..., None]
     upward = np.array([0.0, 0.0, team.gravity])
     thrusts = team.masses[:, None] * (_bend(places, step) + upward) - pulls
     aims = thrusts / np.linalg.norm(thrusts, axis=2, keepdims=True)
-    return Planned(sizes, np.linalg.norm(_bend(aims, step), axis=2))
+    return Planned(sizes, taut, np.linalg.norm(_bend(aims, step), axis=2))
 
 
 def _bend(values: Array, step: float) -> Array:
@@ -62,29 +111,52 @@ def _bend(values: Array, step: float) -> Array:
     return found
 
 
+def most_asked(
+    team: Team,
+    parts: Mapping[str, Part],
+    times: Array,
+    poses: Sequence[Pose],
+    *,
+    formations: Sequence[Array] | None = None,
+    pace: float = 1.0,
+) -> Demand | None:
+    """Where a reference asks most of the drones' rotors; None where nothing is planned, or nobody knows what they give.
+
+    Formations at these times are the allocator's where none are given.
+    """
+    position_control, attitude = parts["position_control"], parts["attitude_control"]
+    if formations is None:
+        allocation = parts["allocation"]
+        assert isinstance(allocation, AllocatorPart)
+        formations = [shares(team, *allocation.formation(team))] * len(times)
+    assert isinstance(position_control, PositionControlPart)
+    found = planned(team, position_control, times, poses, formations, pace)
+    if found is None or "max_acceleration" not in attitude.from_team:
+        return None
+    limits = np.broadcast_to(attitude.settled("max_acceleration", team), team.n)
+    over = np.nan_to_num(found.turning) / limits
+    k, i = (int(place) for place in np.unravel_index(np.argmax(over), over.shape))
+    m, j = (int(place) for place in np.unravel_index(np.argmin(found.taut), found.taut.shape))
+    return Demand(
+        float(over[k, i]), float(found.turning[k, i]), float(limits[i]), float(times[k]), i,
+        float(found.taut[m, j]), (float(times[m]), j),
+    )  # fmt: skip
+
+
 def planned_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
     """A problem where the reference of a rigid load asks a drone for a faster turn than its rotors give."""
     drones, reference = frame.first_drones(), parts["reference"]
-    position_control = parts["position_control"].of(drones)
     assert isinstance(reference, ReferencePart)
-    assert isinstance(position_control, PositionControlPart)
     team = frame.team.of(drones)
     if team.body is None or team.gravity == 0.0 or team.n < 3:
         return
-    count = min(MOST, max(8, round(frame.timing.duration / STEP)))
-    times = np.linspace(0.0, frame.timing.duration, count)
-    found = planned(team, reference, position_control, times)
-    if found is None:
-        return
-    attitude = parts["attitude_control"].of(drones)
-    if "max_acceleration" not in attitude.from_team:
-        return
-    limits = attitude.settled("max_acceleration", team)
-    over = np.nan_to_num(found.turning) / limits
-    k, i = np.unravel_index(np.argmax(over), over.shape)
-    if over[k, i] > ROOM:
+    asked = ("allocation", "position_control", "attitude_control")
+    bound = {layer: parts[layer].of(drones) for layer in asked}
+    times, poses = wanted(team, reference, 0.0, frame.timing.duration)
+    most = most_asked(team, bound, times, poses)
+    if most is not None and most.share > ROOM:
         message = (
-            f"asks drone {drones[i]} at {times[k]:.3g} s to turn its thrust with {found.turning[k, i]:.3g} rad/s^2, and of the {limits[i]:.3g} "
+            f"asks drone {drones[most.drone]} at {most.time:.3g} s to turn its thrust with {most.turning:.3g} rad/s^2, and of the {most.limit:.3g} "
             f"that its rotors give {ROOM:.0%} may be planned: move more slowly, turn the load less, or attach the cables wider apart"
         )
         yield Problem("reference", "", message)

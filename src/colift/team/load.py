@@ -8,12 +8,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from colift.errors import SettingError
 from colift.wording import numbers, shown
 
 Array = NDArray[np.float64]
+
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+"""The attitude in which the load's frame is the world's."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,8 @@ class Body:
         Edges of the box around it, m, which has its middle in the origin.
     points : (k, 3) array
         With which it touches others and the ground, m; left out, the corners of that box.
+    hang : (4,) array
+        Attitude in hover beside that which is wanted, unit quaternion wxyz: level, but of a load that only leaning hangs on its cables.
 
     Raises
     ------
@@ -45,6 +51,7 @@ class Body:
     centre: Array = None  # type: ignore[assignment]  # what is left out becomes an array
     size: Array = None  # type: ignore[assignment]
     points: Array = None  # type: ignore[assignment]
+    hang: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         keep = object.__setattr__
@@ -65,6 +72,8 @@ class Body:
         keep(self, "size", size)
         points = corners(size) if self.points is None else self.points
         keep(self, "points", numbers("points", points, (np.shape(points)[0], 3)))
+        hang = LEVEL if self.hang is None else numbers("hang", self.hang, (4,))
+        keep(self, "hang", np.asarray(hang) / np.linalg.norm(hang))
 
     @property
     def n(self) -> int:
@@ -88,6 +97,18 @@ class Body:
         for extra, place in zip(more, self.attachments, strict=True):
             inertia = inertia + extra * parallel_axis(place - centre)
         return replace(self, centre=centre, inertia=inertia)
+
+
+def times_of(first: ArrayLike, then: ArrayLike) -> Array:
+    """Quaternion (4,), wxyz, of the attitude ``first``, turned in its own frame by ``then``."""
+    a, b = np.asarray(first, dtype=float), np.asarray(then, dtype=float)
+    vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+    return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
+
+
+def from_to(first: ArrayLike, then: ArrayLike) -> Array:
+    """By what ``first`` is turned in its own frame to be ``then``, quaternions (4,)."""
+    return times_of(np.asarray(first) * (1.0, -1.0, -1.0, -1.0), then)
 
 
 def parallel_axis(offset: Array) -> Array:

@@ -1,7 +1,7 @@
 """A formation that holds a rigid load in hover: a ring of drones around it, in plain NumPy.
 
-Each cable leans outwards by the same angle, towards a ring of drones at equal azimuths, in the order of their attachments. Outward
-cables hold the yaw (a load that has turned is turned back) and keep drones and cables apart. The upright parts of the
+Each cable leans outwards by the same angle, straight away from the middle where drones then are far enough apart, else towards
+equal azimuths in the order of the attachments. Outward cables hold the yaw (a load that has turned is turned back) and keep drones and cables apart. The upright parts of the
 tensions share the weight so that it does not tip; a last correction of least norm balances all six.
 """
 
@@ -15,10 +15,13 @@ from numpy.typing import ArrayLike
 
 from colift.kernel.spans import BODY, LINE, POINT
 from colift.team.bodies import Team
-from colift.team.geometry import Array, matrix_of, ring
+from colift.team.geometry import Array, matrix_of, ring, zero_yaw_quaternion
+from colift.team.load import LEVEL
 
 LEAN = math.radians(30.0)
 """Angle of cables from the vertical, unless distances ask for more."""
+LEANING = math.radians(10.0)
+"""Least angle of a load that hangs only leaning: with less, the cable that faces the lost one is hardly taut."""
 WIDER = math.radians(1.0)
 """Step in which the ring is widened."""
 FLAT = 1e-6
@@ -29,13 +32,17 @@ FLOOR = 0.05
 """Least upright part of a tension, over a cable's share of the weight."""
 ENOUGH = 1e-6
 """Of the weight, what a plan that holds the load may leave of it."""
+APART = 0.5
+"""Least angle between the azimuths of two drones, over that of equal azimuths."""
+KEPT = 0.1
+"""Least tension of a cable that others have left alone, over its share of the weight."""
 MIDDLE = 0.15
 """Attachments that are closer to the middle than this part of the farthest one have no azimuth."""
 
 
 def plan(
     team: Team,
-    attitude: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    attitude: ArrayLike | None = None,
     *,
     lean: float = LEAN,
     widest: float = math.radians(60.0),
@@ -50,7 +57,7 @@ def plan(
     team : Team
         Drones and load; without a body, a ring on a point.
     attitude : (4,) array
-        Of the load, unit quaternion wxyz.
+        Of the load, unit quaternion wxyz; left out, that in which it hangs (:attr:`colift.team.load.Body.hang`).
     lean, widest : float
         Angle of the cables from the vertical, rad, and how far it may grow where drones would be too near.
     distance : float or (n,) array
@@ -66,14 +73,19 @@ def plan(
         What no formation holds, such as a load whose weight lies outside of its attachments, is held as far as it can be.
 
     """
+    if attitude is None:
+        attitude = LEVEL if team.body is None else team.body.hang
     arms = team.levers @ matrix_of(attitude).T
     weight = team.load_mass * max(team.gravity, 1e-3)
     floors = np.broadcast_to(FLOOR * weight / team.n if least is None else least, team.n)
     sizes = np.broadcast_to(np.asarray(distance, dtype=float), team.n)
     needed = SPARE * 0.5 * (sizes[:, None] + sizes[None, :])
     best, most = None, -math.inf
-    for angle in np.arange(min(lean, widest), widest + 1e-9, WIDER):
-        found = _held(arms, _outward(arms, team.cable_lengths, float(angle)), weight, floors)
+    angles = np.arange(min(lean, widest), widest + 1e-9, WIDER)
+    tried = [(angles[0], even) for even in (0.0, 0.5)] + [(angle, 1.0) for angle in angles]
+    for angle, even in tried:
+        along = _outward(arms, team.cable_lengths, float(angle), even)
+        found = _held(arms, along, weight, floors)
         ratio = _clearance(arms, team.cable_lengths, found, needed, downwash)
         if ratio > most:
             best, most = found, ratio
@@ -82,6 +94,49 @@ def plan(
     assert best is not None
     tensions = np.linalg.norm(best, axis=1)
     return np.asarray(best / tensions[:, None]), np.asarray(tensions)
+
+
+def shares(team: Team, directions: Array, tensions: Array) -> Array:
+    """A plan's forces (n, 3) over the load's weight, in the frame that has its heading: as kernels turn them with it."""
+    forces = tensions[:, None] * directions / (team.load_mass * max(team.gravity, 1e-3))
+    if team.body is None:
+        return forces
+    w, _, _, z = team.body.hang
+    size = math.hypot(w, z)
+    return forces @ matrix_of((w / size, 0.0, 0.0, z / size)) if z != 0.0 else forces
+
+
+def taken_over(
+    team: Team, directions: Array, acceleration: ArrayLike, attitude: ArrayLike
+) -> Array:
+    """A formation, as :func:`shares` gives it, of cables that stay where they are (n, 3) when others have left.
+
+    Their tensions come as near to the load's motion, with this acceleration (3,) in this attitude (4,), as pulls can. No cable is let
+    go slack.
+    """
+    force = team.load_mass * np.array(acceleration, dtype=float)
+    force[2] += team.load_mass * max(team.gravity, 1e-3)
+    W = float(np.linalg.norm(force))
+    arms = team.levers @ matrix_of(attitude).T
+    reach = max(float(np.abs(arms).max()), 1e-6)
+    columns = np.vstack([directions.T, np.cross(arms, directions).T / reach])
+    wanted = np.concatenate([-force / W, np.zeros(3)])
+    least = KEPT / team.n
+    pulls = np.full(team.n, least)
+    free = np.ones(team.n, dtype=bool)
+    for _ in range(team.n):
+        left = wanted - columns[:, ~free] @ pulls[~free]
+        pulls[free] = np.linalg.lstsq(columns[:, free], left, rcond=1e-9)[0]
+        low = free & (pulls < least)
+        if not low.any() or low.sum() == free.sum():
+            break
+        pulls[low] = least
+        free &= ~low
+    turned = matrix_of(zero_yaw_quaternion(force[None] / W)[0])
+    w, _, _, z = np.asarray(attitude, dtype=float)
+    size = max(math.hypot(w, z), 1e-9)
+    forces = np.maximum(pulls, least)[:, None] * directions
+    return np.asarray(forces @ turned @ matrix_of((w / size, 0.0, 0.0, z / size)))
 
 
 def unheld(team: Team, attitude: ArrayLike, directions: Array, tensions: Array) -> float:
@@ -99,11 +154,12 @@ def least_lean(
 ) -> tuple[float, Array] | None:
     """Least angle, rad, by which the load leans where a plan holds it, and that attitude (4,); None where none does.
 
-    Level first, then leaning in every direction, in steps of 5 degrees: a load that has lost the cable at one corner hangs on
+    Level first, then leaning in every direction, from 10 degrees on in steps of 5: a load that has lost the cable at one corner hangs on
     the others when that corner sinks. Of one angle the direction whose smallest tension is largest.
     """
     most = most if team.n > 2 else 0.0
-    for angle in np.arange(0.0, most + 1e-9, math.radians(5.0)):
+    angles = np.arange(LEANING, most + 1e-9, math.radians(5.0))
+    for angle in (0.0, *angles):
         best, found = 0.0, None
         for azimuth in np.arange(1 if angle == 0.0 else 12) * (math.pi / 6.0):
             half = 0.5 * angle
@@ -126,8 +182,11 @@ def wrench_map(arms: Array) -> Array:
     return np.concatenate([force, cross]).transpose(0, 2, 1).reshape(6, -1)
 
 
-def _outward(arms: Array, lengths: Array, angle: float) -> Array:
-    """Directions (n, 3) that lean by ``angle`` from the vertical, towards a ring of drones."""
+def _outward(arms: Array, lengths: Array, angle: float, even: float) -> Array:
+    """Directions (n, 3) that lean by ``angle`` from the vertical, towards a ring of drones.
+
+    They are straight outwards, so that each pulls without turning the load; with ``even`` at 1 at equal azimuths.
+    """
     n = len(arms)
     level = arms[:, :2] - arms[:, :2].mean(axis=0)
     radii = np.linalg.norm(level, axis=1)
@@ -140,7 +199,12 @@ def _outward(arms: Array, lengths: Array, angle: float) -> Array:
     steps = 2.0 * np.pi * np.arange(len(order)) / len(order)
     start = np.angle(np.mean(np.exp(1j * (azimuth - steps))))
     circle = radii.max() + np.max(lengths) * math.sin(angle)
-    places = circle * np.column_stack([np.cos(start + steps), np.sin(start + steps)])
+    for share in np.linspace(even, 1.0, 5):
+        aim = azimuth + share * np.angle(np.exp(1j * (start + steps - azimuth)))
+        gaps = np.diff(aim, append=aim[0] + 2.0 * np.pi)
+        if gaps.min() >= APART * steps[1] if len(order) > 1 else True:
+            break
+    places = circle * np.column_stack([np.cos(aim), np.sin(aim)])
     outward = np.zeros((n, 2))
     outward[order] = places - level[order]
     size = np.linalg.norm(outward, axis=1, keepdims=True)

@@ -23,6 +23,7 @@ from colift.kernel.status import Status as Status
 from colift.part import Part, Setup, Vector
 from colift.team import Team
 from colift.team.geometry import Array, ring, widest_gap
+from colift.team.plan import least_lean, plan
 from colift.wording import numbers, shown
 
 SIGNATURE = PORTS["allocation"].signature
@@ -44,6 +45,7 @@ class Beside(NamedTuple):
     reference_rates: Any
     estimated_load_attitude: Any
     nominal_forces: Any
+    formation: Any
 
 
 @inline
@@ -51,7 +53,7 @@ def ask(address, force, reference, beside, dt, params, memory, tensions, directi
     """Call an allocator's kernel, from compiled code of studies and benchmarks, by its address."""
     sees = _Sees(
         force, beside.moment, reference, beside.reference_attitude, beside.reference_rates,
-        beside.estimated_load_attitude, beside.nominal_forces,
+        beside.estimated_load_attitude, beside.nominal_forces, beside.formation,
     )  # fmt: skip
     writes = _Writes(tensions, directions, info)
     return _invoke(Wire(address, 0, params, memory, sees, writes), 0, 0.0, dt)
@@ -62,31 +64,31 @@ def unplanned(n):  # type: ignore[no-untyped-def]
     """Beside force and reference: a load that stands level, no moment, and no plan for n cables."""
     level = np.array((1.0, 0.0, 0.0, 0.0))
     return Beside(
-        np.zeros(3), level, np.zeros((3, 3)), level.copy(), np.full((n, 3, 3), np.nan)
+        np.zeros(3), level, np.zeros((3, 3)), level.copy(), np.full((n, 3, 3), np.nan), np.zeros((n, 3))
     )  # fmt: skip
 
 
 @kernel(
     i8(
-        i8, vector, matrix, vector, vector, matrix, vector, tensor, f8, vector, vector, vector,
-        matrix, vector,
+        i8, vector, matrix, vector, vector, matrix, vector, tensor, matrix, f8, vector, vector,
+        vector, matrix, vector,
     ),
     counted=False,
 )  # fmt: skip
 def _ask(  # type: ignore[no-untyped-def]
-    address, force, reference, moment, attitude, rates, load_attitude, nominal, dt, params, memory,
+    address, force, reference, moment, attitude, rates, load_attitude, nominal, formation, dt, params, memory,
     tensions, directions, info,
 ):  # fmt: skip
     """:func:`ask` from Python, to which plain arrays are quicker than named tuples of them."""
-    beside = Beside(moment, attitude, rates, load_attitude, nominal)
+    beside = Beside(moment, attitude, rates, load_attitude, nominal, formation)
     return ask(address, force, reference, beside, dt, params, memory, tensions, directions, info)
 
 
 def _ask_plainly(  # type: ignore[no-untyped-def]
-    address, force, reference, moment, attitude, rates, load_attitude, nominal, *rest
+    address, force, reference, moment, attitude, rates, load_attitude, nominal, formation, *rest
 ):  # fmt: skip
     """The same for a kernel in plain Python."""
-    beside = Beside(moment, attitude, rates, load_attitude, nominal)
+    beside = Beside(moment, attitude, rates, load_attitude, nominal, formation)
     return getattr(ask, "py_func", ask)(address, force, reference, beside, *rest)
 
 
@@ -145,6 +147,17 @@ class AllocatorPart(Part):
     def objective(self, tensions: NDArray[np.float64], directions: NDArray[np.float64]) -> float:
         """What the allocator minimises, N^2; NaN for one that minimises nothing."""
         return float("nan")
+
+    def formation(self, team: Team) -> tuple[Array, Array]:
+        """Directions (n, 3) and tensions (n,), N, of the formation that holds a rigid load in hover; see :mod:`colift.team.plan`."""
+        return plan(team)
+
+    def leaning(self, team: Team) -> tuple[float, Array] | None:
+        """Least angle, rad, by which a rigid load leans to hang on these cables, and that attitude (4,); None where it cannot.
+
+        Asked as :meth:`cannot_hold` is.
+        """
+        return least_lean(team)
 
     def cannot_hold(self, team: Team, thrusts: Vector, directions: Array) -> list[str]:
         """Why the team cannot hold the load in hover; empty when it can, or for all that is known.
@@ -343,6 +356,7 @@ class Allocator:
         self._tensions = np.zeros(self.n)
         self._directions = np.zeros((self.n, 3))
         self._nominal = np.full((self.n, 3, 3), np.nan)
+        self._formation = np.zeros((self.n, 3))  # its own
         self._params = self.part.of(self._drones).params(self._team)
         self._memory = self.part.of(self._drones).memory(self._team)
 
@@ -518,6 +532,7 @@ class Allocator:
             self._rates,
             self._attitude,
             self._nominal,
+            self._formation,
             period,
             self._params,
             self._memory,

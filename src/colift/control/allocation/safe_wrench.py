@@ -23,7 +23,15 @@ from colift.control.allocation.base import (
 from colift.control.allocation.limits import elastic, metres
 from colift.control.allocation.limits.cycle import LEVEL as LEAN_MOST
 from colift.control.allocation.limits.cycle import MAX_TURN
-from colift.control.allocation.limits.usual import RATE, Degrees, Distance, Force, Limited, share_of
+from colift.control.allocation.limits.usual import (
+    LOW,
+    RATE,
+    Degrees,
+    Distance,
+    Force,
+    Limited,
+    share_of,
+)
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion, wrench
@@ -32,7 +40,8 @@ from colift.kernel.spans import BODY, LINE, POINT
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
-from colift.team.plan import least_lean, plan, spanned
+from colift.team.load import LEVEL
+from colift.team.plan import least_lean, plan, shares, spanned
 
 _CONVERGED = int(Status.CONVERGED)
 _ITERATION_LIMIT = int(Status.ITERATION_LIMIT)
@@ -66,6 +75,8 @@ WIDTH, PAIR = elastic.WIDTH, elastic.PAIR
 
 TURNING = 3.0
 """Fastest turn of a cable of 1 m that holds a rigid load, rad/s."""
+LOWER, PLANNED = 0.15, 0.3
+"""Least tension of a cable that holds a rigid load, over its share of the weight, and least upright part of what is planned for it."""
 PRICES = {"horizontal": 60.0, "vertical": 1000.0, "tip": 200.0, "yaw": 20.0}
 """Of what is missing of a wrench, in shares of the load: yaw gives way first, then horizontal force, roll and pitch, the weight last."""
 ROOM = 1e-3
@@ -587,6 +598,8 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     W = math.sqrt(fx * fx + fy * fy + fz * fz)
     cos_yaw, sin_yaw = wrench.heading(pw, px, py, pz)
     formation = column(params, P.rows, n, PLACES.plan)
+    if sees.formation[0, 2] != 0.0:
+        formation = sees.formation.reshape(3 * n)
     if 0.1 * n < W:
         wrench.planned(n, fx, fy, fz, W, cos_yaw, sin_yaw, formation, spare)
     else:
@@ -758,8 +771,8 @@ class SafeWrench(Limited):
     box_deg: Annotated[float, Field(ge=0.0, lt=60.0)] = 5.0
     """Least angle between a cable and the load's surface where it ends, degrees. 0: not limited."""
     tension_min: Force | list[Force] | None = None
-    """Least tension, N; one value, or one per cable. None: half of a cable's share of the load's weight where
-    ``drones.max_thrust`` is known, else 0.05."""
+    """Least tension, N; one value, or one per cable. None: where ``drones.max_thrust`` is known 0.15 of a cable's share of a rigid load's
+    weight, half of one of a point's, else 0.05."""
     tension_max: Force | list[Force] | None = None
     """Largest tension, N; one value, or one per cable. None: what 0.95 of ``drones.max_thrust`` lifts beside the drone,
     or six shares of the weight."""
@@ -783,7 +796,8 @@ class SafeWrench(Limited):
     """Most interior-point steps in one call; limits hold after every step."""
 
     def left_open(self, team: Team) -> dict[str, Vector]:
-        found = self.usual_limits(team, RATE if team.body is None else TURNING)
+        rate, low = (RATE, LOW) if team.body is None else (TURNING, LOWER)
+        found = self.usual_limits(team, rate, low)
         caps = found["tension_max"]
         return {**found, "tension_max": np.where(np.isnan(caps), 6.0 * share_of(team), caps)}
 
@@ -807,13 +821,19 @@ class SafeWrench(Limited):
             f"{', '.join(names)}: start within the limits, or ask for less"
         )
 
+    def leaning(self, team: Team) -> tuple[float, Array] | None:
+        return least_lean(team, **self._asked(team))
+
     def cannot_hold(self, team: Team, thrusts: Vector, directions: Array) -> list[str]:
-        """By its plan of the level load, as nobody leans it: what that needs of attachments, tensions and thrusts."""
-        held = least_lean(team, **self._asked(team))
-        if held is None or held[0] > 0.0:
-            how = "neither level nor leaning" if held is None else "only leaning, not level"
+        """By its plan of the load as it hangs: what that needs of attachments, tensions and thrusts."""
+        held = self.leaning(team)
+        if held is None:
             return [
-                f"its {team.n} cables hold the load {how}: its weight is not between their ends"
+                f"its {team.n} cables hold the load neither level nor leaning: its weight is not between their ends"
+            ]
+        if held[0] > 0.0 and team.body is not None and np.array_equal(team.body.hang, LEVEL):
+            return [
+                f"its {team.n} cables hold the load only leaning, not level: its weight is not between their ends"
             ]
         along, tensions = self.formation(team)
         problems = []
@@ -839,10 +859,8 @@ class SafeWrench(Limited):
         ends = np.linalg.norm(team.levers[i] - team.levers[j], axis=1)
         return min(0.05, 0.5 * float(ends.min()))
 
-    def formation(self, team: Team, attitude: Array | None = None) -> tuple[Array, Array]:
-        """Directions (n, 3) and tensions (n,), N, of the plan in hover; see :func:`colift.team.plan.plan`."""
-        level = (1.0, 0.0, 0.0, 0.0)
-        return plan(team, level if attitude is None else attitude, **self._asked(team))
+    def formation(self, team: Team) -> tuple[Array, Array]:
+        return plan(team, **self._asked(team))
 
     def _asked(self, team: Team) -> dict[str, Any]:
         """What is asked of a plan."""
@@ -852,12 +870,11 @@ class SafeWrench(Limited):
             "widest": 0.9 * most,
             "distance": self.drone_distances(team),
             "downwash": self.downwash,
-            "least": 1.1 * self.tension_floors(team),
+            "least": np.maximum(1.1 * self.tension_floors(team), PLANNED * share_of(team)),
         }
 
     def params(self, team: Team) -> Vector:
         n = team.n
-        directions, tensions = self.formation(team)
         span, axis = spanned(team)
         sigma = max(share_of(team), 1e-6)
         size = max(float(np.abs(team.levers).max()), 1e-3)
@@ -894,7 +911,7 @@ class SafeWrench(Limited):
             clear=gap,
         )
         columns = (
-            tensions[:, None] * directions / (sigma * n), team.levers, outs,
+            shares(team, *self.formation(team)), team.levers, outs,
             np.any(outs != 0.0, axis=1) & (self.box_deg > 0.0), self.tension_floors(team), caps, team.masses,
             np.minimum(most, 1e6), team.cable_lengths, sizes, rotors,
         )  # fmt: skip

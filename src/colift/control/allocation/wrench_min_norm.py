@@ -17,7 +17,8 @@ from colift.kernel.math.columns import column
 from colift.kernel.rounding import NO_TENSION, UNBALANCED
 from colift.part import Vector
 from colift.team import Team
-from colift.team.plan import plan, spanned
+from colift.team.geometry import Array
+from colift.team.plan import plan, shares, spanned
 
 _CONVERGED = int(Status.CONVERGED)
 _ZERO_FORCE = int(Status.ZERO_FORCE)
@@ -52,6 +53,8 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     wrench.turned(qw, qx, qy, qz, n, column(params, P.rows, n, PLACES.arm), ends)
     cos_yaw, sin_yaw = wrench.heading(pw, px, py, pz)
     formation = column(params, P.rows, n, PLACES.plan)
+    if sees.formation[0, 2] != 0.0:
+        formation = sees.formation.reshape(3 * n)
     wrench.planned(n, fx, fy, fz, W, cos_yaw, sin_yaw, formation, w)
     span = params[P.span]
     ax, ay, az = quaternion.into_world(
@@ -96,9 +99,11 @@ class WrenchMinNorm(AllocatorPart):
     cone_deg: Annotated[float, Field(gt=0.0, lt=80.0)] = 30.0
     """Angle of the formation's cables from the vertical in hover, degrees."""
 
+    def formation(self, team: Team) -> tuple[Array, Array]:
+        return plan(team, lean=math.radians(self.cone_deg))
+
     def params(self, team: Team) -> Vector:
-        directions, tensions = plan(team, lean=math.radians(self.cone_deg))
         span, axis = spanned(team)
-        forces = tensions[:, None] * directions / (team.load_mass * max(team.gravity, 1e-3))
+        forces = shares(team, *self.formation(team))
         reach = max(float(abs(team.levers).max()), 1e-9)
         return np.concatenate([[span, *axis, reach], forces.ravel(), team.levers.ravel()])

@@ -40,6 +40,10 @@ MEMORY = Layout(team={"push": 3, "moment": 3})
 P, M = PARAMS.at, MEMORY.at
 
 
+MOST_ERROR = 0.03
+"""Error of the attitude, rad, beyond which it is integrated no faster: what it takes to come back from afar is not learned."""
+
+
 @kernel(SIGNATURE)
 def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     load, reference, forces, u_L = (
@@ -75,7 +79,7 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     for k in range(3):
         S = M.moment + k
         if not stands:
-            memory[S] -= now.dt * params[P.k_I] * e_R[k]
+            memory[S] -= now.dt * params[P.k_I] * min(max(e_R[k], -MOST_ERROR), MOST_ERROR)
         memory[S] = min(max(memory[S], -params[P.most]), params[P.most])
         moment[k] = gyration[k] + ahead[k] - params[P.k_R] * turn[k] - params[P.k_W] * spin[k]
         moment[k] += memory[S]

@@ -1,6 +1,6 @@
 """Nominal pulls of the cables of a rigid load, where its reference plans none: what its wanted motion asks of them, with two derivatives.
 
-The wanted pose and its derivatives ask for a force ``F`` and a moment ``M``; the plan of the formation, turned to them, and
+The wanted pose and its derivatives ask for a force ``F`` and a moment ``M``; the formation, turned to them, and
 the nearest forces that make them exactly are what an allocator answers that nothing limits (:mod:`colift.kernel.math.wrench`). As they are free
 of noise, their derivatives are differences. So what a load is wanted to do passes to the drones without the lag of the filter
 that corrections go through.
@@ -10,46 +10,72 @@ from __future__ import annotations
 
 import numpy as np
 
-from colift.kernel.jit import aside
+from colift.kernel.jit import aside, inline
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion, wrench
 from colift.kernel.math.small import cross, matrix_times
 from colift.kernel.math.sphere import FOLLOW
 from colift.part import Vector
 from colift.team import Team
-from colift.team.plan import plan, spanned
+from colift.team.plan import spanned
 
 NUMBERS = Layout(team={"m": 1, "g": 1, "kind": 1, "axis": 3, "J": 9, "centre": 3})
-"""Parameters, behind which plan and levers of all cables follow (3 n each); ``kind`` and ``axis`` of the wrenches that they can make."""
+"""Parameters, behind which the levers of all cables follow (3 n); ``kind`` and ``axis`` of the wrenches that they can make."""
 N = NUMBERS.at
 STATE = Layout(team={"calls": 1})
-"""Memory, behind which forces and ends (3 n each) and the nominal pulls (9 n) follow."""
+"""Memory, behind which forces, ends and planned forces (3 n each) follow; then what is
+asked of each cable along its planned direction, over its part of the force (n), and the nominal pulls (9 n)."""
+FIRM, FAINT = 0.35, 0.25
+"""Share of a cable's part of the force below which its pull is not taken for a direction as it is, and least pull over that."""
 
 
 def numbers(team: Team) -> Vector:
     """Parameters for a team; none for a load that is a point."""
     if team.body is None:
         return np.zeros(0)
-    directions, tensions = plan(team)
     kind, axis = spanned(team)
-    share = tensions[:, None] * directions / (team.load_mass * max(team.gravity, 1e-3))
     own = NUMBERS.pack(
         team.n, m=team.load_mass, g=team.gravity, kind=kind, axis=axis, J=team.body.inertia.ravel(),
         centre=team.body.centre,
     )  # fmt: skip
-    return np.concatenate([own, share.ravel(), team.levers.ravel()])
+    return np.concatenate([own, team.levers.ravel()])
 
 
 def room(team: Team) -> int:
     """Length of the memory."""
-    return 0 if team.body is None else STATE.size(0) + 15 * team.n
+    return 0 if team.body is None else STATE.size(0) + 19 * team.n
+
+
+@inline
+def _hold_firm(i, firm, planned, w):  # type: ignore[no-untyped-def]
+    """Where hardly anything is asked of cable i let its direction be the formation's: what a slack cable does to it is not a motion.
+
+    Returns what is asked of it along that direction.
+    """
+    o = 3 * i
+    size = (planned[o] ** 2 + planned[o + 1] ** 2 + planned[o + 2] ** 2) ** 0.5
+    x, y, z = planned[o] / size, planned[o + 1] / size, planned[o + 2] / size
+    along = x * w[o] + y * w[o + 1] + z * w[o + 2]
+    u = min(max(0.5 * (along / firm + 1.0), 0.0), 1.0)
+    if u == 1.0:
+        return along
+    # Along it from FAINT on, across it from 0 on, and as it is from 1 on; with two derivatives.
+    u3 = u * u * u
+    step = u3 * (10.0 + u * (-15.0 + 6.0 * u))
+    pull = firm * (FAINT + (1.0 - FAINT) * step + 2.0 * u3 * (-4.0 + u * (7.0 - 3.0 * u)))
+    u = max(2.0 * u - 1.0, 0.0)
+    step = u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
+    w[o] = pull * x + step * (w[o] - along * x)
+    w[o + 1] = pull * y + step * (w[o + 1] - along * y)
+    w[o + 2] = pull * z + step * (w[o + 2] - along * z)
+    return along
 
 
 @aside
-def plan_pulls(n, reference, attitude, rates, dt, keep, params, memory):  # type: ignore[no-untyped-def]
+def plan_pulls(n, formation, reference, attitude, rates, dt, keep, params, memory):  # type: ignore[no-untyped-def]
     """Fill the nominal pulls (n, 3, 3), the last in the memory; ``keep`` is what a filter keeps of the second derivative."""
-    first, count = N.rows, 3 * n
-    share, levers = params[first : first + count], params[first + count : first + 2 * count]
+    count = 3 * n
+    share, levers = formation.reshape(count), params[N.rows : N.rows + count]
     w, ends = memory[1 : 1 + count], memory[1 + count : 1 + 2 * count]
     qw, qx, qy, qz = attitude[0], attitude[1], attitude[2], attitude[3]
     Omega = (rates[0, 0], rates[0, 1], rates[0, 2])
@@ -71,14 +97,19 @@ def plan_pulls(n, reference, attitude, rates, dt, keep, params, memory):  # type
     wrench.turned(qw, qx, qy, qz, n, levers, ends)
     cos_yaw, sin_yaw = wrench.heading(qw, qx, qy, qz)
     wrench.planned(n, fx, fy, fz, W, cos_yaw, sin_yaw, share, w)
+    planned, taut = memory[1 + 2 * count : 1 + 3 * count], memory[1 + 3 * count :]
+    for k in range(count):
+        planned[k] = w[k]
     o = N.axis
     ax, ay, az = quaternion.into_world(qw, qx, qy, qz, params[o], params[o + 1], params[o + 2])
     ux, uy, uz, vx, vy, vz = wrench.unmet(n, fx, fy, fz, mx, my, mz, ends, w)
     wrench.correct(n, params[N.kind], ax, ay, az, ux, uy, uz, vx, vy, vz, ends, w)
+    for i in range(n):
+        taut[i] = n / W * _hold_firm(i, FIRM * W / n, planned, w)
     calls = memory[0]
     memory[0] = min(calls + 1.0, 3.0)
     for i in range(n):
-        o = 1 + 2 * count + 9 * i
+        o = 1 + 3 * count + n + 9 * i
         for k in range(3):
             rate = 0.0 if calls < 1.0 else (w[3 * i + k] - memory[o + k]) / dt
             bend_k = 0.0 if calls < 2.0 else (rate - memory[o + 3 + k]) / dt

@@ -34,8 +34,14 @@ class PositionControlPart(Part):
         """The law for small errors along a horizontal axis of the world, 0 or 1; None where there is no such law."""
         return None
 
-    def planned_pulls(self, team: Team, poses: Sequence[Pose]) -> Array | None:
-        """Forces (poses, n, 3), N, by which it leads the cables of a rigid load along wanted poses; None where it plans none."""
+    def planned_pulls(
+        self, team: Team, poses: Sequence[Pose], formations: Sequence[Array]
+    ) -> tuple[Array, Array] | None:
+        """Forces (poses, n, 3), N, by which it leads the cables of a rigid load along wanted poses; None where it plans none.
+
+        With a formation for each, as of :func:`colift.team.plan.shares`. Beside the forces (poses, n) what is asked of each cable along
+        its direction in the formation, over its part of the whole force: 0 for one that should be slack.
+        """
         return None
 
     def axis_delay(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -33,6 +33,10 @@ class ReferencePart(Part):
             given = [name for name in self.turns if np.any(getattr(self, name))]
             found += [(name, "turns the load, which is a point: load.kind") for name in given]
         return found
+
+    def upright(self) -> Self:
+        """The same without roll and pitch of a rigid load, for one that leans of itself."""
+        return self
 
     def pose(self, team: Team, time: float = 0.0) -> tuple[Vector, Vector, Vector]:
         """Motion (4, 3), attitude (4,), wxyz, and rates with two derivatives (3, 3) that are wanted at a time, s."""

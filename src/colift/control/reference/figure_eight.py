@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field
@@ -76,6 +76,9 @@ class FigureEight(ReferencePart):
     """Largest pitch, twice in each eight, degrees."""
     yaw_deg: Annotated[float, Field(ge=-170.0, le=170.0)] = 0.0
     """Largest yaw, once in each eight, degrees."""
+
+    def upright(self) -> Self:
+        return self.model_copy(update={"roll_deg": 0.0, "pitch_deg": 0.0})
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(

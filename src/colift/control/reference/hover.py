@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field
@@ -42,6 +42,9 @@ class Hover(ReferencePart):
     """Where the load hovers, world frame, m."""
     attitude_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
     """Roll, pitch and yaw of a rigid load, degrees: ``Rz(yaw) Ry(pitch) Rx(roll)``."""
+
+    def upright(self) -> Self:
+        return self.model_copy(update={"attitude_deg": (0.0, 0.0, self.attitude_deg[2])})
 
     def params(self, team: Team) -> Vector:
         return np.array([*self.position, *np.radians(self.attitude_deg)])

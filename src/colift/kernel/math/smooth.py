@@ -48,6 +48,23 @@ def rest_to_rest(s):  # type: ignore[no-untyped-def]
     return value, first, second, third
 
 
+@inline
+def gently(s):  # type: ignore[no-untyped-def]
+    """From 0 to 1 on ``0 <= s <= 1`` and three derivatives, of which the next two vanish at both ends as well."""
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    if s >= 1.0:
+        return 1.0, 0.0, 0.0, 0.0
+    r = 1.0 - s
+    y = s * r
+    value = s**6 * (462.0 + s * (-1980.0 + s * (3465.0 + s * (-3080.0 + s * (1386.0 - 252.0 * s)))))
+    y3 = y * y * y
+    first = 2772.0 * y3 * y * y
+    second = 13860.0 * y3 * y * (1.0 - 2.0 * s)
+    third = 13860.0 * y3 * (4.0 - 18.0 * y)
+    return value, first, second, third
+
+
 PEAK_SPEED, PEAK_BEND = 35.0 / 16.0, 84.0 * math.sqrt(5.0) / 25.0
 """Of :func:`rest_to_rest` over one metre in one second."""
 

@@ -34,15 +34,18 @@ class Limited(AllocatorPart):
         tension_min: Force | list[Force] | None
         max_thrust: Force | list[Force] | None
 
-    def usual_limits(self, team: Team, rate: float = RATE) -> dict[str, Vector]:
-        """What limits are by the team's numbers, as :meth:`left_open`; ``rate`` is the fastest turn of a cable of 1 m, rad/s."""
+    def usual_limits(self, team: Team, rate: float = RATE, low: float = LOW) -> dict[str, Vector]:
+        """What limits are by the team's numbers, as :meth:`left_open`.
+
+        ``rate`` is the fastest turn of a cable of 1 m, rad/s, ``low`` the least tension over a cable's share of the weight.
+        """
         known, share = np.isfinite(team.max_thrusts), share_of(team)
         lifts = MOST * team.max_thrusts - team.masses * team.gravity
         turn = rate / math.sqrt(float(team.cable_lengths.mean())) if team.n > 2 else SWINGING
         return {
             "max_rate": np.where(known.all(), np.full(team.n, turn), math.nan),
-            "tension_min": np.where(known, LOW * share, math.nan),
-            "tension_max": np.where(known, np.maximum(lifts, 1.2 * LOW * share), math.nan),
+            "tension_min": np.where(known, low * share, math.nan),
+            "tension_max": np.where(known, np.maximum(lifts, 1.2 * low * share), math.nan),
             "max_thrust": MOST * team.max_thrusts,
             "min_distance": 2.0 * CLEAR * team.radii,
             "cable_distance": CLEAR * team.radii,
