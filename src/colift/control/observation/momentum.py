@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from colift.control.observation.base import SIGNATURE, ObservationPart
@@ -15,7 +16,7 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion, rotors
 from colift.kernel.math.small import solve_symmetric
 from colift.kernel.math.smooth import decay
-from colift.part import Setup, Vector
+from colift.part import Places, Setup, Vector
 from colift.team import Team
 
 PARAMS = Layout(
@@ -29,11 +30,12 @@ PARAMS = Layout(
 MEMORY = Layout(
     team={"started": 1, "momentum": 3, "common": 3, "wind": 3, "led": 1},
     drone={
-        "own": 3, "felt": 3, "direction": 3, "thrust": 1, "apart": 3,
+        "here": 1, "carried": 3, "own": 3, "felt": 3, "direction": 3, "thrust": 1, "apart": 3,
         "length": 1, "known": 1, "wrong": 1, "pull": 1, "pulled": 1,
     },
 )  # fmt: skip
-"""``momentum`` and ``own``: as far as explained; ``felt``: force beyond thrust, weight and the wanted pull; ``common``: per mass;
+"""``momentum`` and ``own``: as far as explained; of a drone that is ``here`` what it has ``carried`` of the whole, so that who leaves
+takes it along; ``felt``: force beyond thrust, weight and the wanted pull; ``common``: per mass;
 ``apart``: by how much what a drone felt while its cable was slack differs from what all felt in common; ``length`` found beyond
 the one told, time for which it is ``known``, whether it is ``wrong`` enough to be used; ``pull`` along the cable
 by specific force, and whether there is any (``pulled``); whether the load has been ``led`` off the ground."""
@@ -166,10 +168,13 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         size = 1.0 / math.sqrt(max(size, 1e-12))
         for k in range(3):
             memory[o + M.direction + k] *= size
-        if fresh:
+        joins = memory[o + M.here] == 0.0
+        memory[o + M.here] = 1.0
+        if joins:
             memory[o + M.thrust] = thrusts[i]
             for k in range(3):
                 memory[o + M.own + k] = m * v[i, k]
+                memory[M.momentum + k] += m * v[i, k]
         else:
             thrust = lag * memory[o + M.thrust] + (1.0 - lag) * thrusts[i]
             memory[o + M.thrust] = thrust
@@ -183,6 +188,8 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 pull = T[i] * memory[o + M.direction + k]
                 memory[o + M.own + k] += dt * (known + pull + memory[o + M.felt + k])
                 memory[o + M.felt + k] = own * (m * v[i, k] - memory[o + M.own + k])
+        for k in range(3):
+            memory[o + M.carried + k] = m * v[i, k]
         if stands:  # the cable's pull is not what is told, the ground's not to be learned
             for k in range(3):
                 memory[o + M.felt + k] = held[i, k]
@@ -290,6 +297,12 @@ class Momentum(ObservationPart, Delays):
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        kept = super().carry_over(old, fresh, places)
+        gone = np.setdiff1d(np.arange(MEMORY.view(old, "here").shape[0]), places)
+        MEMORY.view(kept, "momentum")[:] -= MEMORY.view(old, "carried")[gone].sum(axis=0)
+        return kept
 
     def watching(self, team: Team) -> tuple[float, float]:
         velocity = self.bandwidths(team).velocity

@@ -30,7 +30,7 @@ from colift.team.geometry import Array
 PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "velocity": 1, "stiffness": 1, "band": 1, "frequency": 1,
-        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1, "rigid": 1, "give": 1,
+        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1, "rigid": 1,
     },
     drone={"m": 1, "L": 1, "least": 1, "most": 1, "drag": 1},
 )  # fmt: skip
@@ -143,15 +143,9 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         rate, bend = spans[i, 1] + reeled[i, 1], spans[i, 2] + reeled[i, 2]
         led = not math.isnan(courses[i, 0, 0])
         push = 0.0
-        give = 0.0
-        if params[P.rigid] > 0.0 and not led:
-            for k in range(3):
-                a = o + M.direction + k
-                give += (x[i, k] - (wanted[i, 0, k] - span * memory[a])) * memory[a]
-            give *= params[P.give]
         for k in range(3):
             a = o + M.direction + k
-            y = x[i, k] - (wanted[i, 0, k] - span * memory[a]) - give * memory[a]
+            y = x[i, k] - (wanted[i, 0, k] - span * memory[a])
             y_dot = v[i, k] - (wanted[i, 1, k] - span * memory[a + 3] - rate * memory[a])
             if led:
                 y, y_dot = x[i, k] - courses[i, 0, k], v[i, k] - courses[i, 1, k]
@@ -214,8 +208,6 @@ class Formation(PositionControlPart, Delays):
     """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
     rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.12
     """The same for cables that hold a rigid load."""
-    give: Annotated[float, Field(ge=0.0, le=1.0)] = 0.7
-    """How much of an error of its place along the cable a drone lets be."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
     max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
@@ -265,7 +257,7 @@ class Formation(PositionControlPart, Delays):
         k = self.gain * band
         own = PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
-            band=band, frequency=self.answers(team), rigid=float(team.body is not None), give=self.give, thrust_filter=self.thrust_filter / band,
+            band=band, frequency=self.answers(team), rigid=float(team.body is not None), thrust_filter=self.thrust_filter / band,
             max_swing=self.max_swing, max_push=self.max_push,
             tangent=math.tan(math.radians(self.max_tilt_deg)), total=float(team.masses.sum()),
             m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,
