@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,9 @@ from colift.team.geometry import Array
 from colift.team.load import LEVEL, from_to
 from colift.team.plan import shares
 from colift.world.actuation.base import ActuationPart
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 PACES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2)
 """At which a reference is flown on, over its own: the fastest at which its plan asks no more of the rotors than may be planned."""
@@ -58,6 +61,17 @@ class Outlook(NamedTuple):
         """Angle of the load in hover, rad."""
         return 2.0 * math.acos(min(abs(self.hang[0]), 1.0))
 
+    def __str__(self) -> str:
+        """In words."""
+        if not self.carries:
+            return f"comes down: {self.reason}"
+        hanging = (
+            f"leaning by {math.degrees(self.lean):.0f} degrees" if self.lean > 0.0 else "level"
+        )
+        upright = ", without the roll and pitch that are wanted" if self.upright else ""
+        pace = f", at {self.pace:.0%} of the pace" if self.pace < 1.0 else ""
+        return f"goes on {hanging}{upright}{pace}"
+
     def flown(self, team: Team) -> Team:
         """The team, its load hanging like that."""
         if team.body is None or self.hang == LEVEL:
@@ -90,7 +104,8 @@ def outlook(
     found = Outlook()
     if team.body is not None:
         if team.n < FEWEST:
-            reason = f"{team.n} cable{'s' * (team.n > 1)} do not hold the attitude of the load"
+            cables = "1 cable does" if team.n == 1 else f"{team.n} cables do"
+            reason = f"{cables} not hold the attitude of the load"
             return Outlook(reason=reason)
         held = allocation.leaning(team)
         if held is not None:
@@ -141,3 +156,20 @@ def _within(team: Team, parts: Mapping[str, Part], hang: ArrayLike, formation: A
         if most is None or most.share <= ROOM:
             break
     return duration
+
+
+def losses(mission: Mission) -> dict[int, Outlook]:
+    """By drone what becomes of a mission whose first team loses it at the start: the hardest moment, as all of the reference is to come."""
+    drones = mission.first_drones()
+    layers = ("actuation", "allocation", "reference", "position_control", "attitude_control")
+    parts = {layer: getattr(mission, layer) for layer in layers}
+    directions = mission.start_directions()
+    found = {}
+    for place, drone in enumerate(drones):
+        rest = [other for other in drones if other != drone]
+        if rest:
+            found[drone] = outlook(
+                mission.team.of(rest), bound(parts, rest), np.delete(directions, place, axis=0),
+                0.0, mission.timing.duration,
+            )  # fmt: skip
+    return found

@@ -8,7 +8,7 @@ goes slack; where little is asked of a cable, it swings its drone around. No con
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,12 @@ from colift.mission.schema import Frame
 from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array, matrix_of
+from colift.team.holding import holding
 from colift.team.load import LEVEL, times_of
 from colift.team.plan import shares
+
+if TYPE_CHECKING:
+    from colift.mission.mission import Mission
 
 ROOM = 0.65
 """Share of the rotors' angular acceleration that a plan may ask for: the rest is for corrections."""
@@ -143,6 +147,15 @@ def most_asked(
     )  # fmt: skip
 
 
+def demand_of(mission: Mission) -> Demand | None:
+    """What the reference asks of a mission's first team, from its begin to the mission's end."""
+    drones = mission.first_drones()
+    team = mission.team.of(drones)
+    asked = ("allocation", "position_control", "attitude_control")
+    bound = {layer: getattr(mission, layer).of(drones) for layer in asked}
+    return most_asked(team, bound, *wanted(team, mission.reference, 0.0, mission.timing.duration))
+
+
 def planned_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
     """A problem where the reference of a rigid load asks a drone for a faster turn than its rotors give."""
     drones, reference = frame.first_drones(), parts["reference"]
@@ -152,8 +165,16 @@ def planned_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]
         return
     asked = ("allocation", "position_control", "attitude_control")
     bound = {layer: parts[layer].of(drones) for layer in asked}
+    allocation = bound["allocation"]
+    assert isinstance(allocation, AllocatorPart)
+    for name, message in holding(team, *allocation.formation(team)).problems():
+        yield Problem("load.attachments", "", f"{name}: {message}")
     times, poses = wanted(team, reference, 0.0, frame.timing.duration)
     most = most_asked(team, bound, times, poses)
+    if most is not None and most.taut < 0.0:
+        when, which = most.slack
+        message = f"asks cable {drones[which]} at {when:.3g} s to push: tilt the load less, or move it more gently"
+        yield Problem("reference", "", message)
     if most is not None and most.share > ROOM:
         message = (
             f"asks drone {drones[most.drone]} at {most.time:.3g} s to turn its thrust with {most.turning:.3g} rad/s^2, and of the {most.limit:.3g} "

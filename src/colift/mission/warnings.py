@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from colift.errors import Problem
 from colift.mission.stability import margin_warnings
 from colift.part import FOLDERS, LISTS, placed
+from colift.team.holding import holding
 
 if TYPE_CHECKING:
     from colift.mission.mission import Mission
@@ -39,4 +40,15 @@ def warnings_of(mission: Mission) -> list[Problem]:
                 shown = f"{value:g}" if isinstance(value, float) else str(value)
                 found.append(Problem(where, shown, message))
     found += margin_warnings(mission)
+    found += _holding_warnings(mission)
     return found
+
+
+def _holding_warnings(mission: Mission) -> list[Problem]:
+    """What the cables of a rigid load hardly hold; that two of them hold no turn is told by who wants an attitude."""
+    drones = mission.first_drones()
+    team, allocation = mission.team.of(drones), mission.allocation.of(drones)
+    if team.body is None or team.n < 3:
+        return []
+    held = holding(team, *allocation.formation(team))
+    return [Problem("load.attachments", "", f"{name}: {text}") for name, text in held.warnings()]
