@@ -118,6 +118,19 @@ def test_a_load_is_picked_up_again_where_it_was_set_down():
     assert r["load"][-1, 0, :2] == pytest.approx(places[-1], abs=0.01)
 
 
+@pytest.mark.parametrize("n", [3, 4, 6])
+def test_a_box_is_fetched_as_a_point_is_and_keeps_its_attitude(n):
+    run = fly("box-pick-up-and-place", drones__count=n)
+    r = run.recording
+    assert run.verdict.level != "fail", run.verdict.reasons
+    assert r["load"][0, 0, 2] == pytest.approx(0.1)  # on its lower face
+    assert r["positions"][0, :, 2] == pytest.approx(0.0)
+    assert r["load"][-1, 0] == pytest.approx([2.0, 0.5, 0.1], abs=0.01)
+    assert r["phase"][-1, 0] == Phase.DONE
+    assert run.metrics["attitude_max_deg"] < 2.0
+    assert not r["attached"][-1].any()
+
+
 @pytest.mark.parametrize("name", ["crazyflie-trio", "heavy-lift"])
 def test_smallest_and_largest_drones(name):
     check(fly(name))

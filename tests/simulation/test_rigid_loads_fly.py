@@ -171,7 +171,6 @@ def test_an_attitude_that_nobody_can_hold_is_warned_of_and_judged() -> None:
     [
         ({"allocation": {"kind": "safe"}}, "shares forces only"),
         ({"load_control": {"kind": "pid"}}, "wants no moment"),
-        ({"supervision": {"kind": "lift"}}, "lifts a load that is a point"),
         ({"load": {"kind": "rigid", "mass": 0.5}}, r"load\.size.*required"),
         ({"load": {"mass": 0.5, "size": [1.0, 1.0, 1.0]}}, "is of a rigid load"),
         ({"load": {"kind": "rigid", "size": [1.0, 0.0, 0.0]}}, r"load\.inertia.*without width"),

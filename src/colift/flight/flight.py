@@ -676,7 +676,8 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
     directions = mission.start_directions()
     first = mission.reference.sample(np.zeros(1), team)[0]
     weight = [0.0, 0.0, team.load_mass * team.gravity]
-    pose = mission.reference.pose(team)
+    stands = mission.start.on_ground
+    pose = (mission.reference.upright() if stands else mission.reference).pose(team)
     attitude = pose[1]
     if mission.start.directions is None:
         hover = shares(team, *mission.allocation.of(drones).formation(team))
@@ -692,7 +693,7 @@ def start_state(mission: Mission) -> tuple[Start, Vector]:
     aim = np.where(norms > 1e-9, thrust / np.maximum(norms, 1e-9), upward)
     load = first[0] + np.asarray(mission.start.load_offset)
     if mission.start.on_ground and mission.ground is not None:
-        load[2] = mission.ground.height
+        load[2] = mission.ground.height + mission.sole
     places = mission.start_places(load)
     thrusts = norms[:, 0]
     if places is not None:

@@ -47,14 +47,17 @@ def ground_checks(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> 
     path = reference.sample(times, frame.team)[:, 0]
     load = path[0] + np.asarray(start.load_offset)
     if ground is not None:
-        yield from _below(frame, ground.height, path[:, 2], times, load)
+        stands = ground.height + frame.sole
+        yield from _below(frame, stands, path[:, 2], times, load)
         if start.on_ground:
-            load[2] = ground.height
+            load[2] = stands
     places = frame.start_places(load)
     if places is None:
         return
     drones = frame.first_drones()
-    spans = np.linalg.norm(places - load, axis=1)
+    body = frame.team.of(drones).body
+    ends = load if body is None else load + body.attachments
+    spans = np.linalg.norm(places - ends, axis=1)
     lengths = frame.true_team.cable_lengths[drones]
     for i, span, length in zip(drones, spans, lengths, strict=True):
         if span > length * (1.0 + 1e-9):
@@ -80,7 +83,10 @@ def _below(
     frame: Frame, height: float, z: np.ndarray, times: np.ndarray, load: np.ndarray
 ) -> Iterable[Problem]:
     """A load that starts, or is led, into the ground."""
-    allowed = f'must be at least world.ground.height = {height:g} m; lower it, or set world.ground = "none"'
+    stands = (
+        "" if frame.sole == 0.0 else f", and {frame.sole:g} m from there to the middle of the load"
+    )
+    allowed = f'must be at least world.ground.height = {height - frame.sole:g} m{stands}; lower it, or set world.ground = "none"'
     if not frame.start.on_ground and load[2] < height - DEEP:
         yield Problem("start.load_offset", f"z = {load[2]:.4g} m at t = 0", f"the load {allowed}")
         return

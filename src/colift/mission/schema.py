@@ -647,6 +647,12 @@ class Frame(Section):
         given = np.array(self.start.directions, dtype=float)[drones]
         return np.asarray(given / np.linalg.norm(given, axis=1, keepdims=True))
 
+    @property
+    def sole(self) -> float:
+        """How high above the ground the load's place is when it stands, m."""
+        body = self._bare.body
+        return 0.0 if body is None else body.sole
+
     def start_places(self, load: Array) -> Array | None:
         """Places (k, 3) of the drones that fly from the start, world, m, around a load at ``load``; None for those on taut cables."""
         drones = self.first_drones()
@@ -660,7 +666,10 @@ class Frame(Section):
         around = 2.0 * math.pi * np.arange(len(drones)) / len(drones)
         spread = np.column_stack([np.cos(around), np.sin(around), np.zeros(len(drones))])
         level = np.where(sizes > 1e-9, level / np.maximum(sizes, 1e-9), spread)
-        return np.asarray(load + self.start.spread * self.team.cable_lengths[drones, None] * level)
+        team = self.team.of(drones)
+        ends = load + team.levers if team.body is None else load + team.body.attachments
+        ends = ends - [0.0, 0.0, 1.0] * (ends - load + self.sole)  # on the ground
+        return np.asarray(ends + self.start.spread * team.cable_lengths[:, None] * level)
 
 
 def with_derived(table: Mapping[str, Any]) -> dict[str, Any]:

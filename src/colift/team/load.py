@@ -81,6 +81,11 @@ class Body:
         return int(self.attachments.shape[0])
 
     @property
+    def sole(self) -> float:
+        """How far below its middle it touches the ground when it stands level, m."""
+        return -float(self.points[:, 2].min())
+
+    @property
     def arms(self) -> Array:
         """Attachments (n, 3) from the centre of mass, m."""
         return self.attachments - self.centre

@@ -16,7 +16,7 @@ from colift.control.supervision._lift_memory import (
     begin_to_hook,
     go,
 )
-from colift.control.supervision._lift_senses import hold_out, length, make_up, usual
+from colift.control.supervision._lift_senses import arm_of, hold_out, length, make_up, usual
 from colift.control.supervision._lift_up import NEAR
 from colift.control.supervision._lift_ways import arc, set_off, steady
 from colift.kernel.jit import inline
@@ -81,17 +81,18 @@ def land(t, time, dt, sees, params, memory, writes):  # type: ignore[no-untyped-
         centre = memory[M.goal : M.goal + 3]
         start = (b[0] - centre[0], b[1] - centre[1], b[2] - centre[2])
         level = math.hypot(start[0], start[1])
+        out, low = away * L + memory[o + M.out], 0.02 - params[P.sole]
         if level > 1e-6:
-            end = (away * L * start[0] / level, away * L * start[1] / level, 0.02)
+            end = (out * start[0] / level, out * start[1] / level, low)
         else:
-            end = (away * L, 0.0, 0.02)
+            end = (out, 0.0, low)
         arc(s, s1, s2, centre, start, end, courses[i])
         for k in range(3):
             courses[i, k, 2] -= sink[k]
         if s < 0.8:
             make_up(i, 1.0 - decay(dt, 1.0 / params[P.learn]), memory)
         else:
-            height = sees.estimated_positions[i, 2] - memory[M.ground]
+            height = sees.estimated_positions[i, 2] - memory[M.ground] + params[P.sole]
             speed = sees.estimated_velocities[i, 2]
             borne = memory[o + M.felt + 2] - memory[o + M.bias + 2] > TOUCHED * m * params[P.g]
             rests = sink[1] > 0.9 * SINK and speed > -0.3 * SINK
@@ -179,6 +180,7 @@ def slacken(t, time, dt, sees, params, memory):  # type: ignore[no-untyped-def]
     for i in range(n):
         o, L = M.rows + M.width * i, length(i, sees, params)
         memory[o + M.want] = memory[o + M.sign] = memory[o + M.down] = 0.0
+        memory[o + M.out] = math.hypot(arm_of(i, 0, sees), arm_of(i, 1, sees))
         for k in range(3):
             away = (L + memory[o + M.span]) * sees.received_directions[i, k]
-            memory[o + M.start + k] = memory[M.goal + k] - away
+            memory[o + M.start + k] = memory[M.goal + k] + arm_of(i, k, sees) - away

@@ -15,13 +15,14 @@ PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "feel": 1, "learn": 1, "delay": 1, "lag": 1, "fly": 1, "rounds": 1,
         "aside": 1, "places": 2 * MOST_ROUNDS, "speed": 1, "touch": 1, "release": 1, "ground": 1,
-        "hook": 1, "climb": 1, "margin": 1, "rise": 1, "stiff": 1, "damp": 1, "clear": 1,
+        "sole": 1, "hook": 1, "climb": 1, "margin": 1, "rise": 1, "stiff": 1, "damp": 1, "clear": 1,
         "catch": 1, "patience": 1, "brake": 1,
     },
     drone={"m": 1, "L": 1, "drag": 1},
 )  # fmt: skip
 """``feel``: bandwidth of the observers, ``learn``: with which what they feel is made up for, 1/s; ``rounds``: how often the load is
-lifted, ``fly``: time of the reference in each, s; ``aside``: whether it is set down at ``places``; speeds of the way (``speed``), of ``touch``-down and to ``hook``, m/s; time to ``climb``, s; ``margin``: height
+lifted, ``fly``: time of the reference in each, s; ``aside``: whether it is set down at ``places``; speeds of the way (``speed``), of ``touch``-down and to ``hook``, m/s; time to ``climb``, s; ``sole``: height of
+the load's place above the ground when it stands, m; ``margin``: height
 from which on it goes down at the speed of touch-down, m; time in which the lift share would ``rise`` by 1, s; how a lifted load is held,
 as accelerations of the load by the lift share: per height (``stiff``) and speed (``damp``); height
 above the ground at which the reference begins at least (``clear``), m; speed at which a cable comes taut (``catch``), m/s; time after which
@@ -36,7 +37,7 @@ MEMORY = Layout(
     },
     drone={
         "own": 3, "felt": 3, "thrust": 1, "bias": 3, "start": 3, "span": 3, "want": 1, "mean": 3,
-        "spread": 1, "sign": 1, "hooked": 1, "length": 1, "down": 1,
+        "spread": 1, "sign": 1, "hooked": 1, "length": 1, "down": 1, "out": 1,
     },
 )  # fmt: skip
 """Of the team: ``phase``, ``since`` when; the ``round``, from 0; the ``clock``; ``place`` of the load on the ``ground``; the load's way from ``begin`` to ``goal``, its
@@ -46,7 +47,7 @@ by how much the reference is flown ``above`` itself; observer of the vertical
 a ``slow`` descent; force per mass that all drones feel, now (``air``) and when they felt what is their mean (``calm``); whether the load is to
 be hooked ``again``, and how often something went otherwise than planned (``setbacks``).
 Of a drone: ``own`` momentum as far as explained and the force ``felt``; ``bias`` made up for; where it ``start``ed; ``span`` with derivatives
-and the rate that it ``want``s; ``length`` of its cable as measured, less what is wound out; ``mean`` force, while slack or in flight, without its cable's."""
+and the rate that it ``want``s; ``length`` of its cable as measured, less what is wound out, how far ``out`` that ends on the load; ``mean`` force, while slack or in flight, without its cable's."""
 P, M = PARAMS.at, MEMORY.at
 
 FLY, STAND, CLIMB, HOOK, TENSION, RISE = (

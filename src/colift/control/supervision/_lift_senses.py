@@ -27,6 +27,12 @@ def span_of(i, sees):  # type: ignore[no-untyped-def]
 
 
 @inline
+def arm_of(i, k, sees):  # type: ignore[no-untyped-def]
+    """Along axis k, how far from the load's place cable i ends on it, m; nothing on a point."""
+    return sees.estimated_ends[i, 0, k] - sees.estimated_load[0, k]
+
+
+@inline
 def length(i, sees, params):  # type: ignore[no-untyped-def]
     """Length of cable i as it is wound out and has been found in flight, m: that from which spans are counted."""
     return params[P.rows + P.width * i + P.L] + sees.reeled[i, 0] + sees.found_lengths[i]

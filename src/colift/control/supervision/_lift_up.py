@@ -18,6 +18,7 @@ from colift.control.supervision._lift_memory import (
 )
 from colift.control.supervision._lift_senses import (
     alone,
+    arm_of,
     forget,
     hold_out,
     length,
@@ -69,7 +70,9 @@ def strays(sees, params, memory):  # type: ignore[no-untyped-def]
         L = length(i, sees, params)
         away = fast = 0.0
         for k in range(3):
-            place = memory[M.place + k] - NEAR * L * sees.received_directions[i, k]
+            place = (
+                memory[M.place + k] + arm_of(i, k, sees) - NEAR * L * sees.received_directions[i, k]
+            )
             away += (sees.estimated_positions[i, k] - place) ** 2
             fast += sees.estimated_velocities[i, k] ** 2
         worst = max(worst, math.sqrt(away) / (0.06 * max(L, 0.5)), math.sqrt(fast) / 0.15)
@@ -109,7 +112,11 @@ def climb(t, time, dt, sees, params, memory, courses):  # type: ignore[no-untype
         a = sees.received_directions[i]
         b = memory[o + M.start : o + M.start + 3]
         start = (b[0] - place[0], b[1] - place[1], b[2] - place[2])
-        end = (-NEAR * L * a[0], -NEAR * L * a[1], -NEAR * L * a[2])
+        end = (
+            arm_of(i, 0, sees) - NEAR * L * a[0],
+            arm_of(i, 1, sees) - NEAR * L * a[1],
+            arm_of(i, 2, sees) - NEAR * L * a[2],
+        )
         arc(s, s1, s2, place, start, end, courses[i])
         make_up(i, 1.0 - decay(dt, 1.0 / params[P.learn]), memory)
     off = strays(sees, params, memory)

@@ -176,7 +176,7 @@ class Lift(SupervisionPart, Delays):
 
     paced_by = "position_control"
     works_with: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "load_control": ("balance",),
+        "load_control": ("balance", "pose"),
         "position_control": ("formation",),
         "observation": ("momentum",),
         "agents": ("central",),
@@ -195,16 +195,9 @@ class Lift(SupervisionPart, Delays):
     """Most speed of the load on its way to and from the reference, m/s."""
     touch_speed: Annotated[float, Field(gt=0.0, le=0.5)] | None = None
     """Speed at which it is led onto the ground, m/s. None: 0.08 to 0.12, as fast as the cables' pull throws the drones up until they are
-    braked; 0.06 where that is faster than 0.16."""
+    braked; 0.06 where that is faster than 0.16. A rigid load at most at 0.08: its corners may come first."""
     ground: Annotated[float, Field(ge=-1e6, le=1e6)] = 0.0
-    """Height of the load when it is set down, m, for a flight that begins in the air; otherwise where it stood."""
-
-    def check(self, team: Team) -> list[tuple[str, str]]:
-        if team.body is not None:
-            return [
-                ("kind", "lifts a load that is a point (load.kind); a rigid one starts in the air")
-            ]
-        return super().check(team)
+    """Height of the ground where the load is set down, m, for a flight that begins in the air; otherwise where it stood."""
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         yield from self.delay_warnings(mission, "position_control")
@@ -227,8 +220,10 @@ class Lift(SupervisionPart, Delays):
         ratio = 1.0 + float(team.masses.sum()) / team.load_mass
         thrown = pull * (TOLD + self.lag + self.delay)
         caught = thrown > THROWN or team.n <= 2
-        touch = self.touch_speed or (SLOW if caught else min(max(thrown, GENTLE), BRISK))
+        brisk = BRISK if team.body is None else GENTLE
+        touch = self.touch_speed or (SLOW if caught else min(max(thrown, GENTLE), brisk))
         places = self.set_down if isinstance(self.set_down, list) else [self.set_down or (0.0, 0.0)]
+        sole = 0.0 if team.body is None else team.body.sole
         spots = np.zeros((MOST_ROUNDS, 2))
         spots[: len(places)] = places
         hook = 0.01 * max(1.0, math.sqrt(L))
@@ -238,7 +233,7 @@ class Lift(SupervisionPart, Delays):
             team.n, g=team.gravity, m_L=team.load_mass, feel=1.5 * band, learn=0.4 * band,
             delay=self.delay if self.predicted else 0.0, lag=self.lag, fly=self.fly,
             rounds=len(places), aside=float(self.set_down is not None), places=spots.ravel(), speed=self.speed, touch=touch,
-            release=float(self.afterwards == "release"), ground=self.ground,
+            release=float(self.afterwards == "release"), ground=self.ground + sole, sole=sole,
             hook=hook, climb=max(2.0, 5.0 * math.sqrt(L)),
             rise=max(RAISE, SLOWLY / band), stiff=0.1 * band * band * ratio,
             damp=0.5 * band * ratio, margin=0.08 * max(1.0, math.sqrt(L)),
