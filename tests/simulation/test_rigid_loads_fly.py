@@ -200,6 +200,15 @@ def test_a_new_reference_that_asks_for_no_attitude_gets_none() -> None:
     assert not flight.bus.reference_rates.any()
 
 
+def test_drones_whose_cables_end_apart_do_not_touch_at_the_start() -> None:
+    """On a point, four cables that lean by 30 degrees would bring drones of this size together; on the box's corners they are apart."""
+    drones = {"count": 4, "vehicle": "s500", "cable_length": 0.8}
+    assert load_mission({**BOX, "drones": drones, "allocation": {"min_distance": 0.8}})
+    small = {**BOX["load"], "size": [0.02, 0.02, 0.02]}
+    with pytest.raises(MissionError, match=r"must leave the drones .* apart"):
+        load_mission({**BOX, "load": small, "drones": {**drones, "radius": 0.8}})
+
+
 def test_a_box_that_loses_a_corner_goes_on_leaning_so_that_the_corner_sinks() -> None:
     event = {"at": 1.0, "field": "drones.lose", "value": 1}
     mission = load_mission({**BOX, "events": [event], "timing": {"duration": 8.0}})
