@@ -12,6 +12,7 @@ from colift.kernel.jit import inline
 from colift.kernel.math.small import cross
 
 COUNT = 10
+"""How many numbers these are."""
 
 
 @inline
