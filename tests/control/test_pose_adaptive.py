@@ -194,7 +194,9 @@ def test_a_rigid_load_keeps_its_other_controllers_whichever_law_it_names() -> No
 
 
 def test_the_recording_says_what_was_learned() -> None:
+    """Most of it: the rest of the moment comes of drones that hold their places, and of the integral."""
     offset = [0.03, 0.0, 0.0]
     changed = {"load_control.kind": "pose-adaptive", "truth.centre_of_mass_offset": offset}
     recording = Flight(load_mission("box-figure-eight", {**CALM, **changed})).run()
-    assert recording["learned_load"][-1, 1] == pytest.approx(0.5 * 0.03, rel=0.15)
+    late = recording["learned_load"][recording.time > 20.0, 1]
+    assert 0.75 < late.mean() / (0.5 * 0.03) < 1.05

@@ -56,6 +56,16 @@ def test_rates_are_the_derivatives_of_the_wanted_attitude(name: str) -> None:
     assert fastest > 1.0
 
 
+@pytest.mark.parametrize("name", TURNING)
+def test_an_upright_reference_keeps_its_heading_at_rest_and_nothing_else(name: str) -> None:
+    upright, team = TURNING[name].upright(), Team.uniform(3)
+    for t in (0.0, 1.3, 2.6, 4.0, 5.2):
+        motion, attitude, rates = upright.pose(team, t)
+        assert attitude[1:3] == pytest.approx([0.0, 0.0], abs=1e-15)
+        assert rates[:, :2] == pytest.approx(np.zeros((3, 2)), abs=1e-12)
+        np.testing.assert_array_equal(motion, TURNING[name].pose(team, t)[0])
+
+
 def test_a_load_that_leans_points_along_the_force() -> None:
     eight, team = FigureEight(lean=1.0, ramp=2.0, period=5.0), Team.uniform(3)
     for t in (2.0, 3.3, 4.9):

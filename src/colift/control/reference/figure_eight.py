@@ -102,7 +102,7 @@ class FigureEight(ReferencePart):
         return self
 
     def upright(self) -> Self:
-        return self.model_copy(update={"roll_deg": 0.0, "pitch_deg": 0.0})
+        return self.model_copy(update={"roll_deg": 0.0, "pitch_deg": 0.0, "lean": 0.0})
 
     def params(self, team: Team) -> Vector:
         rate = 2.0 * np.pi / self.period

@@ -89,6 +89,10 @@ class Waypoints(ReferencePart):
             )
         return self
 
+    def upright(self) -> Self:
+        level = tuple((0.0, 0.0, yaw) for _, _, yaw in self.attitudes_deg)
+        return self.model_copy(update={"attitudes_deg": level})
+
     def params(self, team: Team) -> Vector:
         departures = (self.hold * k + self.travel * max(k - 1, 0) for k in range(len(self.points)))
         attitudes = np.radians(self.attitudes_deg or [(0.0, 0.0, 0.0)] * len(self.points))
