@@ -103,11 +103,11 @@ def default_kind(layer: str, sections: Mapping[str, Any]) -> str | None:
 
     named = {of: table(of).get("kind") for of in (*FORMATION, "supervision", "sensing")}
     stands = table("start").get("on_ground") is True
+    turns = table("load").get("kind") == RIGID
     asked = any(
         named[of] not in (None, FORMATION[of], TURNING[of])
-        for of in ("load_control", "position_control")
+        for of in (("position_control",) if turns else ("load_control", "position_control"))
     )
-    turns = table("load").get("kind") == RIGID
     formation = stands or turns or any(named[of] == own for of, own in FORMATION.items())
     drones = table("drones")
     count = drones.get("count", 4)

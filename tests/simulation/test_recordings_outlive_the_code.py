@@ -118,7 +118,7 @@ def test_opening_imports_no_kernel() -> None:
 
 NEWER = {"phase", "ground_forces", "touch_speeds", "clock", "measured_ages", "estimated_ages", "received_ages", "agent_status",
          "estimated_forces", "estimated_wind", "standing", "lift_share", "spans", "unhooked",
-         "lifted_mass", "measured_specific_forces", "specific_force_ages", "reeled", "found_lengths",
+         "lifted_mass", "measured_specific_forces", "specific_force_ages", "reeled", "found_lengths", "learned_load",
          "load_attitude", "load_rates", "reference_attitude", "reference_rates", "moment",
          "measured_load_attitude", "measured_load_rates", "estimated_load_attitude",
          "estimated_load_rates"}  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from colift.control.reference.figure_eight import FigureEight
+from colift.control.reference.waypoints import Waypoints
 from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
@@ -29,17 +30,88 @@ BOX: dict[str, Any] = {
 }
 
 
-def test_rates_are_the_derivatives_of_the_wanted_attitude() -> None:
-    eight = FigureEight(roll_deg=20.0, pitch_deg=-15.0, yaw_deg=70.0, ramp=2.0, period=3.0)
-    team, h = Team.uniform(3), 1e-4
+TURNING = {
+    "figure-eight": FigureEight(roll_deg=20.0, pitch_deg=-15.0, yaw_deg=70.0, ramp=2.0, period=3.0),
+    "leaning": FigureEight(lean=0.8, ramp=5.0, period=4.5),
+    "waypoints": Waypoints(
+        points=[(0.0, 0.0, 1.0)] * 3,
+        attitudes_deg=[(0.0, 0.0, 0.0), (30.0, -20.0, 200.0), (-10.0, 25.0, 360.0)],
+        travel=2.0,
+        hold=0.5,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TURNING)
+def test_rates_are_the_derivatives_of_the_wanted_attitude(name: str) -> None:
+    reference, team, h, fastest = TURNING[name], Team.uniform(3), 1e-4, 0.0
     for t in (0.7, 1.9, 4.2):
-        turn = [matrix_of(eight.pose(team, t + k * h)[1]) for k in (-1, 0, 1)]
+        turn = [matrix_of(reference.pose(team, t + k * h)[1]) for k in (-1, 0, 1)]
         slope = turn[1].T @ (turn[2] - turn[0]) / (2.0 * h)
-        rates = [eight.pose(team, t + k * h)[2] for k in (-1, 0, 1)]
+        rates = [reference.pose(team, t + k * h)[2] for k in (-1, 0, 1)]
         spin = np.array([slope[2, 1], slope[0, 2], slope[1, 0]])
         assert rates[1][0] == pytest.approx(spin, abs=1e-5)
         assert (rates[2][:2] - rates[0][:2]) / (2.0 * h) == pytest.approx(rates[1][1:], abs=1e-4)
-    assert np.abs(rates[1]).max() > 1.0
+        fastest = max(fastest, np.abs(rates[1]).max())
+    assert fastest > 1.0
+
+
+@pytest.mark.parametrize("name", TURNING)
+def test_an_upright_reference_keeps_its_heading_at_rest_and_nothing_else(name: str) -> None:
+    upright, team = TURNING[name].upright(), Team.uniform(3)
+    for t in (0.0, 1.3, 2.6, 4.0, 5.2):
+        motion, attitude, rates = upright.pose(team, t)
+        assert attitude[1:3] == pytest.approx([0.0, 0.0], abs=1e-15)
+        assert rates[:, :2] == pytest.approx(np.zeros((3, 2)), abs=1e-12)
+        np.testing.assert_array_equal(motion, TURNING[name].pose(team, t)[0])
+
+
+def test_a_load_that_leans_points_along_the_force() -> None:
+    eight, team = FigureEight(lean=1.0, ramp=2.0, period=5.0), Team.uniform(3)
+    for t in (2.0, 3.3, 4.9):
+        motion, attitude, _ = eight.pose(team, t)
+        force = motion[2] + [0.0, 0.0, team.gravity]
+        upward = matrix_of(attitude)[:, 2]
+        assert upward == pytest.approx(force / np.linalg.norm(force), abs=1e-12)
+    assert eight.pose(team, 0.0)[1] == pytest.approx([1.0, 0.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match=r"lean = 0\.5 says the attitude"):
+        FigureEight(lean=0.5, yaw_deg=10.0)
+
+
+def test_each_waypoint_is_reached_with_its_attitude_at_rest_and_without_a_jump() -> None:
+    reference, team = TURNING["waypoints"], Team.uniform(3)
+    for k, (roll, pitch, yaw) in enumerate(reference.attitudes_deg):
+        for t in (2.5 * k + 0.01, 2.5 * k + 0.49):
+            _, attitude, rates = reference.pose(team, t)
+            cr, cp, cy = np.cos(np.radians([roll, pitch, yaw]))
+            sr, sp, _ = np.sin(np.radians([roll, pitch, yaw]))
+            R = matrix_of(attitude)
+            assert R[2] == pytest.approx([-sp, cp * sr, cp * cr], abs=1e-9)
+            assert R[0, 0] == pytest.approx(cy * cp, abs=1e-9)
+            assert np.abs(rates).max() < 1e-9
+    for step in (1e-3, 1e-4):
+        for corner in (0.5, 2.5, 3.0):
+            poses = [reference.pose(team, corner + k * step) for k in range(-20, 21)]
+            rows = np.array([[*attitude, *rates.ravel()] for _, attitude, rates in poses])
+            assert np.abs(np.diff(rows, axis=0)).max() < 1e3 * step
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            {"attitudes_deg": [[0.0, 0.0, 9.0]]},
+            "attitudes_deg has 1 attitudes, and must have none or one for each of the 2 points",
+        ),
+        ({"attitudes_deg": [[0.0, 70.0, 0.0]] * 2}, r"attitudes_deg.*60 \(found 70"),
+        ({"attitudes_deg": [[0.0, 9.0]] * 2}, "attitudes_deg"),
+    ],
+)
+def test_attitudes_of_waypoints_that_cannot_be_meant_are_refused(
+    change: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(MissionError, match=says):
+        load_mission({**BOX, "reference": {"kind": "waypoints", **change}})
 
 
 def test_a_tilted_box_with_its_centre_of_mass_aside_hovers() -> None:
@@ -138,6 +210,15 @@ def test_a_new_reference_that_asks_for_no_attitude_gets_none() -> None:
     assert not flight.bus.reference_rates.any()
 
 
+def test_drones_whose_cables_end_apart_do_not_touch_at_the_start() -> None:
+    """On a point, four cables that lean by 30 degrees would bring drones of this size together; on the box's corners they are apart."""
+    drones = {"count": 4, "vehicle": "s500", "cable_length": 0.8}
+    assert load_mission({**BOX, "drones": drones, "allocation": {"min_distance": 0.8}})
+    small = {**BOX["load"], "size": [0.02, 0.02, 0.02]}
+    with pytest.raises(MissionError, match=r"must leave the drones .* apart"):
+        load_mission({**BOX, "load": small, "drones": {**drones, "radius": 0.8}})
+
+
 def test_a_box_that_loses_a_corner_goes_on_leaning_so_that_the_corner_sinks() -> None:
     event = {"at": 1.0, "field": "drones.lose", "value": 1}
     mission = load_mission({**BOX, "events": [event], "timing": {"duration": 8.0}})
@@ -187,3 +268,6 @@ def test_what_a_rigid_load_cannot_fly_with_is_refused(change: dict[str, Any], sa
 def test_a_point_load_is_asked_for_no_attitude() -> None:
     with pytest.raises(MissionError, match=r"reference\.yaw_deg.*turns the load, which is a point"):
         load_mission("figure-eight", {"reference.yaw_deg": 20.0})
+    turns = {"reference.attitudes_deg": [[0.0, 0.0, 9.0]] * 5}
+    with pytest.raises(MissionError, match=r"attitudes_deg.*turns the load, which is a point"):
+        load_mission("point-to-point", turns)

@@ -218,7 +218,9 @@ def test_what_nobody_drives_from_outside_is_refused():
     flight = Flight(load_mission("hover", {"load_control.kind": "external"}))
     with pytest.raises(ColiftError, match='only a layer of kind "external"'):
         flight.act("allocation", desired_tensions=np.ones(4))
-    with pytest.raises(ColiftError, match="writes force, moment, steady_force, not thrusts"):
+    with pytest.raises(
+        ColiftError, match="writes force, moment, learned_load, steady_force, not thrusts"
+    ):
         flight.act("load_control", thrusts=np.ones(4))
     with pytest.raises(SettingError, match="force"):
         flight.act("load_control", force=[0.0, 0.0])

@@ -270,7 +270,7 @@ PORTS: dict[str, Port] = {
             sees=(
                 *_named("estimated")[1:], "estimated_ends", "estimated_forces", "estimated_wind",
                 *_WANTED, "wanted_ends", "nominal_forces", "formation", "standing", "spans", "courses", "reeled",
-                "found_lengths",
+                "found_lengths", "learned_load",
                 *_RECEIVED,
             ),
         ),

@@ -122,6 +122,7 @@ SIGNALS = (
     Signal("estimated_load_attitude", (4,), "1", "-", "load to world", "attitude of the load that the controllers use, wxyz", initial=LEVEL, writer="estimation"),
     Signal("estimated_load_rates", (3,), "rad/s", "-", "load", "its rates that the controllers use", writer="estimation"),
     Signal("found_lengths", ("n",), "m", "-", "-", "by how much each cable is found to be longer than is told", writer="observation"),
+    Signal("learned_load", (10,), "kg, kg m, kg m^2", "theta", "load", "what is learned of a rigid load beyond what is told: mass, first moment (3), inertia about its place (xx, yy, zz, yz, xz, xy)", writer="load_control"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 

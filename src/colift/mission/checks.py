@@ -189,13 +189,10 @@ def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
     team = frame.team.of(drones)
     if not contact.watched(team.radii):
         return
-    positions = -team.cable_lengths[:, None] * frame.start_directions()
+    ends = np.zeros((team.n, 3)) if team.body is None else team.body.attachments
+    positions = ends - team.cable_lengths[:, None] * frame.start_directions()
     found = contact.first_contact(
-        team.radii,
-        team.cable_lengths,
-        positions[None],
-        np.zeros((1, team.n, 3)),
-        np.ones((1, team.n)),
+        team.radii, team.cable_lengths, positions[None], ends[None], np.ones((1, team.n))
     )
     if found is not None:
         field = "cone_deg" if given is None else "directions"

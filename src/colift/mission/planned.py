@@ -31,6 +31,8 @@ ROOM = 0.65
 """Share of the rotors' angular acceleration that a plan may ask for: the rest is for corrections."""
 TAUT = 0.1
 """Least that a plan may ask of a cable, over its part of the force: with less it is slack at the first gust."""
+WINDOW = 0.04
+"""Time over which it is taken, s: a jump of what is wanted, such as of a snap, asks for no more than a drone falls behind meanwhile."""
 STEP, MOST = 0.02, 1500
 """Time between two moments that are looked at, s, unless there would be more than so many."""
 
@@ -109,9 +111,10 @@ def planned(
 
 
 def _bend(values: Array, step: float) -> Array:
-    """Second derivative along the first axis; NaN at both ends."""
+    """Second derivative along the first axis, over a time to which motors answer; NaN at both ends."""
     found = np.full_like(values, np.nan)
-    found[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / step**2
+    k = min(max(1, round(WINDOW / step)), (len(values) - 1) // 2)
+    found[k:-k] = (values[2 * k :] - 2.0 * values[k:-k] + values[: -2 * k]) / (k * step) ** 2
     return found
 
 

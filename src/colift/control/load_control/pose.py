@@ -21,7 +21,7 @@ from pydantic import Field
 from colift.control.load_control._upright import keep_upright
 from colift.control.load_control.base import SIGNATURE, LoadControlPart
 from colift.control.tuning import Delays, sway
-from colift.kernel.jit import kernel
+from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.small import cross, matrix_times
@@ -44,8 +44,25 @@ MOST_ERROR = 0.03
 """Error of the attitude, rad, beyond which it is integrated no faster: what it takes to come back from afar is not learned."""
 
 
-@kernel(SIGNATURE)
-def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+@inline
+def turn_error(q, Omega, q_d, w_d):  # type: ignore[no-untyped-def]
+    """Errors ``e_R`` and ``e_W``, wanted rates and their derivative, all in the frame of the load as it is."""
+    # E = R^T R_d.
+    ew, ex, ey, ez = quaternion.multiply(
+        q[0], -q[1], -q[2], -q[3], q_d[0], q_d[1], q_d[2], q_d[3]
+    )  # fmt: skip
+    wanted = quaternion.into_world(ew, ex, ey, ez, w_d[0, 0], w_d[0, 1], w_d[0, 2])
+    tx, ty, tz = quaternion.into_world(ew, ex, ey, ez, w_d[1, 0], w_d[1, 1], w_d[1, 2])
+    # 1/2 (R_d^T R - R^T R_d)^v is the imaginary part of E, times -2 ew: the sine of the angle along the axis.
+    e_R = (-2.0 * ew * ex, -2.0 * ew * ey, -2.0 * ew * ez)
+    e_W = (Omega[0] - wanted[0], Omega[1] - wanted[1], Omega[2] - wanted[2])
+    cx, cy, cz = cross(Omega, wanted)
+    return e_R, e_W, wanted, (tx - cx, ty - cy, tz - cz)
+
+
+@inline
+def hold_pose(dt, errors, force, moment, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    """The law with the ``errors`` of :func:`turn_error`, where what is learned needs more force (world) and moment (load's frame)."""
     load, reference, forces, u_L = (
         sees.estimated_load,
         sees.reference,
@@ -57,34 +74,24 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     m, g, last = params[P.m], params[P.g], sees.estimated_forces.shape[0] - 1
     c = (params[P.centre], params[P.centre + 1], params[P.centre + 2])
     Omega = (w[0], w[1], w[2])
-    # The wanted rates in the frame of the load as it is: E = R^T R_d.
-    ew, ex, ey, ez = quaternion.multiply(
-        q[0], -q[1], -q[2], -q[3], q_d[0], q_d[1], q_d[2], q_d[3]
-    )  # fmt: skip
-    wanted = quaternion.into_world(ew, ex, ey, ez, w_d[0, 0], w_d[0, 1], w_d[0, 2])
-    turning = quaternion.into_world(ew, ex, ey, ez, w_d[1, 0], w_d[1, 1], w_d[1, 2])
-    # 1/2 (R_d^T R - R^T R_d)^v is the imaginary part of E, times -2 ew: the sine of the angle along the axis.
-    e_R = (-2.0 * ew * ex, -2.0 * ew * ey, -2.0 * ew * ez)
-    e_W = (Omega[0] - wanted[0], Omega[1] - wanted[1], Omega[2] - wanted[2])
+    e_R, e_W, _, acceleration = errors
     J = P.J
     gyration = cross(Omega, matrix_times(J, params, Omega))
-    ahead = cross(Omega, wanted)
-    ahead = matrix_times(
-        J, params, (turning[0] - ahead[0], turning[1] - ahead[1], turning[2] - ahead[2])
-    )
+    ahead = matrix_times(J, params, acceleration)
     turn = matrix_times(J, params, e_R)
     spin = matrix_times(J, params, e_W)
     stands = sees.standing[last] != 0.0
-    moment = writes.moment
+    M_L = writes.moment
     for k in range(3):
         S = M.moment + k
         if not stands:
-            memory[S] -= now.dt * params[P.k_I] * min(max(e_R[k], -MOST_ERROR), MOST_ERROR)
+            memory[S] -= dt * params[P.k_I] * min(max(e_R[k], -MOST_ERROR), MOST_ERROR)
         memory[S] = min(max(memory[S], -params[P.most]), params[P.most])
-        moment[k] = gyration[k] + ahead[k] - params[P.k_R] * turn[k] - params[P.k_W] * spin[k]
-        moment[k] += memory[S]
-    mx, my, mz = quaternion.into_world(q[0], q[1], q[2], q[3], moment[0], moment[1], moment[2])
-    moment[0], moment[1], moment[2] = mx, my, mz
+        M_L[k] = gyration[k] + ahead[k] - params[P.k_R] * turn[k] - params[P.k_W] * spin[k]
+        M_L[k] += memory[S] + moment[k]
+    M_L[0], M_L[1], M_L[2] = quaternion.into_world(
+        q[0], q[1], q[2], q[3], M_L[0], M_L[1], M_L[2]
+    )  # fmt: skip
 
     # The centre of mass, as it is and as it should be.
     at = quaternion.into_world(q[0], q[1], q[2], q[3], c[0], c[1], c[2])
@@ -98,15 +105,26 @@ def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     motion = quaternion.into_world(
         q_d[0], q_d[1], q_d[2], q_d[3], bend[0] + twist[0], bend[1] + twist[1], bend[2] + twist[2]
     )  # fmt: skip
-    share = 1.0 if stands else 1.0 - decay(now.dt, 1.0 / params[P.rate])
+    share = 1.0 if stands else 1.0 - decay(dt, 1.0 / params[P.rate])
     for k in range(3):
-        memory[M.push + k] += share * (forces[last, k] - memory[M.push + k])
-        planned = m * (reference[2, k] + motion[k] + (g if k == 2 else 0.0)) - memory[M.push + k]
+        memory[M.push + k] += share * (forces[last, k] + force[k] - memory[M.push + k])
+        planned = m * (reference[2, k] + motion[k] + (g if k == 2 else 0.0)) + force[k]
+        planned -= memory[M.push + k]
         e_x = load[0, k] + at[k] - reference[0, k] - at_d[k]
         e_v = load[1, k] + speed[k] - reference[1, k] - speed_d[k]
         writes.steady_force[k] = planned
         u_L[k] = planned - params[P.k_p] * e_x - params[P.k_d] * e_v
     keep_upright(m * g, params[P.tangent], u_L)
+
+
+@kernel(SIGNATURE)
+def _pose(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    w = sees.estimated_load_rates
+    errors = turn_error(
+        sees.estimated_load_attitude, (w[0], w[1], w[2]), sees.reference_attitude, sees.reference_rates
+    )  # fmt: skip
+    none = (0.0, 0.0, 0.0)
+    hold_pose(now.dt, errors, none, none, sees, params, memory, writes)
 
 
 class Pose(LoadControlPart, Delays):

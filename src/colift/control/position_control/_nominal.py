@@ -12,7 +12,7 @@ import numpy as np
 
 from colift.kernel.jit import aside, inline
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion, wrench
+from colift.kernel.math import inertial, quaternion, wrench
 from colift.kernel.math.small import cross, matrix_times
 from colift.kernel.math.sphere import FOLLOW
 from colift.part import Vector
@@ -72,8 +72,8 @@ def _hold_firm(i, firm, planned, w):  # type: ignore[no-untyped-def]
 
 
 @aside
-def plan_pulls(n, formation, reference, attitude, rates, dt, keep, params, memory):  # type: ignore[no-untyped-def]
-    """Fill the nominal pulls (n, 3, 3), the last in the memory; ``keep`` is what a filter keeps of the second derivative."""
+def plan_pulls(n, formation, reference, attitude, rates, learned, dt, keep, params, memory):  # type: ignore[no-untyped-def]
+    """Fill the nominal pulls (n, 3, 3), the last in the memory, of the load as told and ``learned`` (10,); ``keep`` is what a filter keeps of the second derivative."""
     count = 3 * n
     share, levers = formation.reshape(count), params[N.rows : N.rows + count]
     w, ends = memory[1 : 1 + count], memory[1 + count : 1 + 2 * count]
@@ -84,15 +84,24 @@ def plan_pulls(n, formation, reference, attitude, rates, dt, keep, params, memor
     c = (params[N.centre], params[N.centre + 1], params[N.centre + 2])
     gyration = cross(Omega, matrix_times(J, params, Omega))
     M = matrix_times(J, params, turning)
-    mx, my, mz = quaternion.into_world(
-        qw, qx, qy, qz, M[0] + gyration[0], M[1] + gyration[1], M[2] + gyration[2]
+    u = quaternion.into_body(
+        qw, qx, qy, qz, reference[2, 0], reference[2, 1], reference[2, 2] + params[N.g]
     )
+    more, moment = inertial.needed(learned, Omega, turning, u)
+    lever = cross(c, more)
+    mx, my, mz = quaternion.into_world(
+        qw, qx, qy, qz,
+        M[0] + gyration[0] + moment[0] - lever[0],
+        M[1] + gyration[1] + moment[1] - lever[1],
+        M[2] + gyration[2] + moment[2] - lever[2],
+    )  # fmt: skip
     bend, twist = cross(Omega, cross(Omega, c)), cross(turning, c)
     ax, ay, az = quaternion.into_world(
         qw, qx, qy, qz, bend[0] + twist[0], bend[1] + twist[1], bend[2] + twist[2]
     )
-    fx, fy = m * (reference[2, 0] + ax), m * (reference[2, 1] + ay)
-    fz = max(m * (reference[2, 2] + az + params[N.g]), 0.1 * m * params[N.g])
+    px, py, pz = quaternion.into_world(qw, qx, qy, qz, more[0], more[1], more[2])
+    fx, fy = m * (reference[2, 0] + ax) + px, m * (reference[2, 1] + ay) + py
+    fz = max(m * (reference[2, 2] + az + params[N.g]) + pz, 0.1 * m * params[N.g])
     W = max((fx * fx + fy * fy + fz * fz) ** 0.5, 1e-9)
     wrench.turned(qw, qx, qy, qz, n, levers, ends)
     cos_yaw, sin_yaw = wrench.heading(qw, qx, qy, qz)

@@ -21,7 +21,7 @@ from colift.control.position_control.base import SIGNATURE, Pose, PositionContro
 from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import rotors
+from colift.kernel.math import inertial, rotors
 from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
 from colift.team import Team
@@ -97,7 +97,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         own, kept = params[P.rows + P.width * n :], memory[M.rows + M.width * n :]
         replanned = kept[0] == 0.0 and memory[M.rows + M.started] != 0.0
         plan_pulls(
-            n, sees.formation, reference, sees.reference_attitude, sees.reference_rates, dt, keep_snap, own, kept
+            n, sees.formation, reference, sees.reference_attitude, sees.reference_rates, sees.learned_load, dt, keep_snap, own, kept
         )  # fmt: skip
         if replanned:
             keep_courses(n, kept, memory, M.rows + M.direction, M.width)
@@ -271,11 +271,12 @@ class Formation(PositionControlPart, Delays):
         if team.body is None:
             return None
         own, kept = numbers(team), np.zeros(room(team))
+        told = np.zeros(inertial.COUNT)
         found, taut = np.empty((len(poses), team.n, 3)), np.empty((len(poses), team.n))
         for row, asked, formation, (motion, attitude, rates) in zip(
             found, taut, formations, poses, strict=True
         ):
-            plan_pulls(team.n, formation, motion, attitude, rates, 1.0, 0.0, own, kept)
+            plan_pulls(team.n, formation, motion, attitude, rates, told, 1.0, 0.0, own, kept)
             row[:] = kept[-9 * team.n :].reshape(team.n, 3, 3)[:, 0]
             asked[:] = kept[-10 * team.n : -9 * team.n]
         return found, taut

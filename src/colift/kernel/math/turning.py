@@ -4,7 +4,7 @@ The angles turn it about its third axis (yaw), then its second (pitch), then its
 
     Omega = (phi' - psi' sin theta,  theta' cos phi + psi' cos theta sin phi,  psi' cos theta cos phi - theta' sin phi)
 
-Derivatives are carried along as truncated series ``(value, first, second)``.
+Derivatives are carried along as truncated series ``(value, first, second)``; of angles with the third, too.
 """
 
 from __future__ import annotations
@@ -50,3 +50,32 @@ def turn_to(roll, pitch, yaw, attitude, rates):  # type: ignore[no-untyped-def]
         rates[m, 0] = d_roll[m] - sunk[m]
         rates[m, 1] = q1[m] + q2[m]
         rates[m, 2] = r1[m] - r2[m]
+
+
+@inline
+def times_of_four(a, b):  # type: ignore[no-untyped-def]
+    """Product of two series with three derivatives each."""
+    p0, p1, p2 = _times(a, b)
+    return p0, p1, p2, a[3] * b[0] + 3.0 * (a[2] * b[1] + a[1] * b[2]) + a[0] * b[3]
+
+
+@inline
+def _arctan(u):  # type: ignore[no-untyped-def]
+    """Angle with this tangent, and its cosine, both with three derivatives."""
+    angle = math.atan(u[0])
+    s, c = math.sin(angle), math.cos(angle)
+    twice, across = 2.0 * s * c, c * c - s * s
+    # angle' = u' c^2
+    a1 = u[1] * c * c
+    a2 = u[2] * c * c - u[1] * twice * a1
+    a3 = u[3] * c * c - 2.0 * u[2] * twice * a1 - u[1] * (2.0 * across * a1 * a1 + twice * a2)
+    cosine = (c, -s * a1, -s * a2 - c * a1 * a1, -s * a3 - 3.0 * c * a1 * a2 + s * a1 * a1 * a1)
+    return (angle, a1, a2, a3), cosine
+
+
+@inline
+def lean_along(x, y):  # type: ignore[no-untyped-def]
+    """Roll and pitch that turn the third axis along ``(x, y, 1)``, of which x and y have three derivatives; so have the angles."""
+    pitch, cosine = _arctan(x)
+    roll, _ = _arctan(times_of_four(y, cosine))
+    return (-roll[0], -roll[1], -roll[2], -roll[3]), pitch
