@@ -177,7 +177,7 @@ def planned_by(mission: Mission, times: np.ndarray) -> Planned:
 
 
 def test_a_motion_that_asks_too_much_is_refused_with_drone_moment_and_numbers() -> None:
-    with pytest.raises(MissionError, match=r"asks drone 2 at 8\.\d* s to turn its thrust with 6\d"):
+    with pytest.raises(MissionError, match=r"asks drone 2 at 3\.\d* s to turn its thrust with 6\d"):
         load_mission("box-figure-eight", {"drones.count": 3, "reference.ramp": 3.0})
 
 
