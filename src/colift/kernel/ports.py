@@ -278,7 +278,7 @@ PORTS: dict[str, Port] = {
             "attitude_control",
             sees=(
                 "estimated_attitudes", "estimated_rates", "estimated_ages", "desired_attitudes",
-                "desired_rates",
+                "desired_rates", "desired_turning",
             ),
         ),
         Port("actuation", sees=("thrusts", "torques", "motor_health")),

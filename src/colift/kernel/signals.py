@@ -203,9 +203,10 @@ OTHERWISE = (
     Signal("pace", (5,), "s, s, 1, 1, s", "-", "-", "how the pace of the reference's clock changes (:mod:`colift.kernel.math.leaning`)", initial=(0.0, 0.0, 1.0, 1.0, 0.0)),
     Signal("formations", ("n", 2, 3), "1", "-", "wanted heading", "formations that hold a rigid load: cables' forces in hover over its weight, before and after the lean"),
     Signal("formation", ("n", 3), "1", "-", "wanted heading", "the one on the way between them; zeros where nobody plans one"),
+    Signal("desired_turning", ("n", 3), "rad/s^2", "-", "body", "angular acceleration of each drone that is planned, so that its torque need not wait for an error", writer="position_control"),
     Signal("clock_bends", (2,), "1/s, 1/s^2", "-", "-", "derivatives of how fast the reference's clock runs", writer="supervision"),
 )  # fmt: skip
-"""What becomes of the reference when the team has changed: the flight writes it. Not recorded, as the reference and the clock are."""
+"""What becomes of the reference when the team has changed, which the flight writes, and what is planned beyond it; not recorded."""
 
 HIDDEN = (ANSWER, NOMINAL, WINCHES, ATTACHMENTS, *LEAD, *ENDS, *MESSAGES, *OTHERWISE)
 """Signals of the bus that stand outside of its row."""

@@ -105,7 +105,7 @@ def _delay_aware(now, sees, params, memory, writes):  # type: ignore[no-untyped-
             cap = math.sqrt(2.0 * most * size / (1.0 if k == 2 else max(split, 1.0)))
             reach = params[P.rho + k] * size
             turn = errors[k] * (params[P.rho + k] if reach <= cap else cap / size)
-            wanted = -K_d * (turning[k] - Omega_d[i, k] + turn)
+            wanted = J * sees.desired_turning[i, k] - K_d * (turning[k] - Omega_d[i, k] + turn)
             # The motors' lag is inverted: at the end of the period acts what is wanted now.
             acting = memory[act + k]
             wanted = min(max(wanted, -J * most), J * most)

@@ -106,3 +106,34 @@ def _command(i, hx, hy, hz, dx, dy, dz, attitudes, rates):  # type: ignore[no-un
         rates[i, 0] = 2.0 * ox
         rates[i, 1] = 2.0 * oy
         rates[i, 2] = 2.0 * oz
+
+
+AHEAD = 9
+"""Numbers that :func:`look_ahead` remembers of a drone."""
+
+
+@inline
+def look_ahead(i, fresh, dt, keep, lag, p, memory, o, u, attitudes, turning):  # type: ignore[no-untyped-def]
+    """What the thrust vector ``p`` (3,) that is planned of drone i, free of any feedback, will be while a command acts.
+
+    Half a period of it is added to ``u[i]``, ``lag`` of it to the thrust, which is returned; its angular acceleration, body frame, is
+    put into ``turning[i]``. ``memory[o : o + 9]`` holds the last planned direction, its rate and filtered second derivative.
+    """
+    q = attitudes[i]
+    size = math.sqrt(max(p[0] * p[0] + p[1] * p[1] + p[2] * p[2], 1e-12))
+    more = 0.0
+    for k in range(3):
+        rate = 0.0 if fresh else (p[k] - memory[o + k]) / dt
+        bend = 0.0 if fresh else (rate - memory[o + 3 + k]) / dt
+        memory[o + k], memory[o + 3 + k] = p[k], rate
+        memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend
+        rate += (
+            0.5 * dt * memory[o + 6 + k]
+        )  # a difference is that of the middle of the last period
+        u[i, k] += 0.5 * dt * rate
+        more += lag * rate * p[k] / size
+    x, y, _ = quaternion.into_body(
+        q[0], q[1], q[2], q[3], memory[o + 6], memory[o + 7], memory[o + 8]
+    )
+    turning[i, 0], turning[i, 1], turning[i, 2] = -y / size, x / size, 0.0
+    return more

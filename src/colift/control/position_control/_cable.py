@@ -12,6 +12,29 @@ CABLE = FOLLOW + 6
 
 
 @inline
+def size_of(i, nominal):  # type: ignore[no-untyped-def]
+    """Size of the planned pull of cable i, with two derivatives."""
+    T = T1 = T2 = 0.0
+    for k in range(3):
+        T += nominal[i, 0, k] * nominal[i, 0, k]
+    T = math.sqrt(max(T, 1e-18))
+    for k in range(3):
+        T1 += nominal[i, 0, k] / T * nominal[i, 1, k]
+    for k in range(3):
+        rate = (nominal[i, 1, k] - nominal[i, 0, k] / T * T1) / T
+        T2 += rate * nominal[i, 1, k] + nominal[i, 0, k] / T * nominal[i, 2, k]
+    return T, T1, T2
+
+
+@inline
+def course_of(i, k, nominal, T, T1, T2):  # type: ignore[no-untyped-def]
+    """Along axis k the direction of that pull, its rate and its second derivative."""
+    direction = nominal[i, 0, k] / T
+    rate = (nominal[i, 1, k] - direction * T1) / T
+    return direction, rate, (nominal[i, 2, k] - direction * T2 - 2.0 * rate * T1) / T
+
+
+@inline
 def lead(i, alpha, nominal, omega, dt, memory, o, reach):  # type: ignore[no-untyped-def]
     """Lead the cable of drone i towards ``alpha[i]``: direction, rate and acceleration in ``memory[o : o + 9]``.
 
@@ -23,21 +46,11 @@ def lead(i, alpha, nominal, omega, dt, memory, o, reach):  # type: ignore[no-unt
     if math.isnan(nominal[i, 0, 0]):
         follow(memory, o, alpha[i, 0], alpha[i, 1], alpha[i, 2], omega, dt, reach)
         return
-    T = T1 = T2 = 0.0
-    for k in range(3):
-        T += nominal[i, 0, k] * nominal[i, 0, k]
-    T = math.sqrt(max(T, 1e-18))
-    for k in range(3):
-        T1 += nominal[i, 0, k] / T * nominal[i, 1, k]
-    for k in range(3):
-        rate = (nominal[i, 1, k] - nominal[i, 0, k] / T * T1) / T
-        T2 += rate * nominal[i, 1, k] + nominal[i, 0, k] / T * nominal[i, 2, k]
+    T, T1, T2 = size_of(i, nominal)
     damp = 1.0 / (1.0 + 2.0 * omega * dt)
     c = o + FOLLOW
     for k in range(3):
-        direction = nominal[i, 0, k] / T
-        rate = (nominal[i, 1, k] - direction * T1) / T
-        turning = (nominal[i, 2, k] - direction * T2 - 2.0 * rate * T1) / T
+        direction, rate, turning = course_of(i, k, nominal, T, T1, T2)
         before = memory[c + 3 + k]
         off = alpha[i, k] - direction - memory[c + k]
         speed = (before + dt * omega * omega * off) * damp

@@ -120,10 +120,12 @@ def plan_pulls(n, formation, reference, attitude, rates, learned, dt, keep, para
     for i in range(n):
         o = 1 + 3 * count + n + 9 * i
         for k in range(3):
+            # Differences are those in the middle of a period, or at its begin: they are led to its end.
+            past = memory[o + 3 + k] - 0.5 * dt * memory[o + 6 + k]
             rate = 0.0 if calls < 1.0 else (w[3 * i + k] - memory[o + k]) / dt
-            bend_k = 0.0 if calls < 2.0 else (rate - memory[o + 3 + k]) / dt
+            bend_k = 0.0 if calls < 2.0 else (rate - past) / dt
             memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend_k
-            memory[o + 3 + k] = rate
+            memory[o + 3 + k] = rate + 0.5 * dt * memory[o + 6 + k]
             memory[o + k] = w[3 * i + k]
 
 

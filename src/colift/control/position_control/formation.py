@@ -10,10 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.margins import Places
-from colift.control.position_control._aim import AIM_ALONG, aim_along, limit
+from colift.control.position_control._aim import AHEAD, AIM_ALONG, aim_along, limit, look_ahead
 from colift.control.position_control._cable import (
     CABLE,
+    course_of,
     lead,
+    size_of,
     swing,
 )
 from colift.control.position_control._nominal import keep_courses, numbers, plan_pulls, room
@@ -30,18 +32,18 @@ from colift.team.geometry import Array
 PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "velocity": 1, "stiffness": 1, "band": 1, "frequency": 1,
-        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1, "rigid": 1,
+        "thrust_filter": 1, "max_swing": 1, "max_push": 1, "tangent": 1, "total": 1, "rigid": 1, "lag": 1, "swing": 1,
     },
     drone={"m": 1, "L": 1, "least": 1, "most": 1, "drag": 1},
 )  # fmt: skip
 """``band``: bandwidth of the velocity loop, 1/s; thrusts ``least`` and ``most``, N; ``total``: mass of all drones."""
 MEMORY = Layout(
-    team={"planned": 3},
+    team={"planned": 3, "plan": 3},
     drone={
-        "started": 1, "direction": CABLE, "aim": AIM_ALONG, "jerk": 3, "snap": 3, "change": 9,
+        "started": 1, "direction": CABLE, "aim": AIM_ALONG, "ahead": AHEAD, "jerk": 3, "snap": 3, "change": 9,
     },
 )  # fmt: skip
-"""``planned``: thrust vector as far as it is free of noise; ``change``: pull that the load's motion asks for, two derivatives."""
+"""``planned``: thrust vector as far as it is free of noise, ``plan`` as far as it is free of any feedback; ``change``: pull that the load's motion asks for, two derivatives."""
 P, M = PARAMS.at, MEMORY.at
 
 
@@ -52,8 +54,8 @@ FULL = 0.95
 """Share of a drone's largest thrust that it is asked for."""
 CALM = 0.6
 """Share of the bandwidth and of ``max_push`` that is left while the load stands: when the tensions go, no attitude follows faster."""
-SMOOTH = 2.0
-"""Time constant of the filter of the reference's fourth derivative, in periods."""
+SMOOTH, PLANNED = 2.0, 0.5
+"""Time constants of the filters of the reference's fourth derivative and of what a plan has of it, in periods."""
 IDLE = 0.1
 """Thrust of a drone that stands on the ground, over its weight."""
 UNKNOWN = 2.5
@@ -73,6 +75,16 @@ def _ask_for(i, share, wanted, dt, keep, memory, o):  # type: ignore[no-untyped-
         memory[o + M.change + 6 + k] = -share * memory[o + M.snap + k]
 
 
+@inline
+def nominal_thrust(i, m, g, span, wanted, nominal, thrust):  # type: ignore[no-untyped-def]
+    """What drone i of a rigid load must give where all goes as planned (3,), N."""
+    T, T1, T2 = size_of(i, nominal)
+    for k in range(3):
+        direction, _, turning = course_of(i, k, nominal, T, T1, T2)
+        thrust[k] = m * (wanted[i, 2, k] - span * turning) - T * direction
+    thrust[2] += m * g
+
+
 @kernel(SIGNATURE)
 def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
@@ -87,7 +99,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     g, m_L, omega = params[P.g], params[P.m_L], params[P.frequency]
     keep = decay(dt, params[P.thrust_filter])
     # A reference of corners steps in its jerk.
-    keep_snap = decay(dt, SMOOTH * dt)
+    keep_snap, keep_plan = decay(dt, SMOOTH * dt), decay(dt, PLANNED * dt)
     # By how much what the cables are told to do for the load falls short: the drones do it together.
     short_x = forces[n, 0] - m_L * reference[2, 0]
     short_y = forces[n, 1] - m_L * reference[2, 1]
@@ -97,12 +109,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         own, kept = params[P.rows + P.width * n :], memory[M.rows + M.width * n :]
         replanned = kept[0] == 0.0 and memory[M.rows + M.started] != 0.0
         plan_pulls(
-            n, sees.formation, reference, sees.reference_attitude, sees.reference_rates, sees.learned_load, dt, keep_snap, own, kept
+            n, sees.formation, reference, sees.reference_attitude, sees.reference_rates, sees.learned_load, dt, keep_plan, own, kept
         )  # fmt: skip
         if replanned:
             keep_courses(n, kept, memory, M.rows + M.direction, M.width)
         if math.isnan(nominal[0, 0, 0]):
             nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
+    planned_now = memory[M.plan : M.plan + 3]
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
@@ -135,7 +148,10 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     upright, lift = k1, k2
     if (n <= 2 or params[P.rigid] > 0.0) and not stands:
         L = params[P.rows + P.L] + reeled[0, 0] + found[0]
-        k1, k2, k3, k4 = pendulum_gains(g, min(max(height, 0.2 * L), 2.0 * L), params[P.band])
+        p1, p2, p3, p4 = pendulum_gains(g, min(max(height, 0.2 * L), 2.0 * L), params[P.band])
+        swing_in = params[P.swing]
+        k1, k2 = k1 + swing_in * (p1 - k1), k2 + swing_in * (p2 - k2)
+        k3, k4 = swing_in * p3, swing_in * p4
     for i in range(n):
         p, o = P.rows + P.width * i, M.rows + M.width * i
         m, L = params[p + P.m], params[p + P.L] + reeled[i, 0] + found[i]
@@ -167,6 +183,10 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             planned[k] = needed - T[i] * memory[a]
             known = T[i] * pull + forces[i, k] + m / params[P.total] * short[k]
             u[i, k] = needed + m * most * u[i, k] - known
+        more = 0.0
+        if params[P.rigid] > 0.0:
+            for k in range(3):
+                writes.desired_turning[i, k] = 0.0
         wind = sees.estimated_wind
         past = (wind[0] - v[i, 0], wind[1] - v[i, 1], wind[2] - v[i, 2])
         ux, uy, uz = rotors.thrust_for(u[i, 0], u[i, 1], u[i, 2], params[p + P.drag], past)
@@ -175,6 +195,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             for k in range(3):
                 u[i, k] = planned[k] = 0.0 if k < 2 else IDLE * m * g
         else:
+            if params[P.rigid] > 0.0 and not led:
+                nominal_thrust(i, m, g, span, wanted, nominal, planned_now)
+                more = look_ahead(
+                    i, memory[o + M.started] == 0.0, dt, keep_plan, params[P.lag], planned_now, memory,
+                    o + M.ahead, u, sees.estimated_attitudes, writes.desired_turning,
+                )  # fmt: skip
+                planned[0], planned[1], planned[2] = planned_now
             limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         fresh = memory[o + M.started] == 0.0
@@ -182,6 +209,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         aim_along(
             i, fresh, dt, keep, planned, u, norm, memory, o + M.aim, thrusts, attitudes, rates
         )
+        thrusts[i] += more
 
 
 class Formation(PositionControlPart, Delays):
@@ -208,6 +236,8 @@ class Formation(PositionControlPart, Delays):
     """Natural frequency of the reference filter on the sphere over the bandwidth of the velocity loop; lower below heavy drones."""
     rigid_frequency: Annotated[float, Field(gt=0.0, le=10.0)] = 0.12
     """The same for cables that hold a rigid load."""
+    swing: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25
+    """How much three drones or more damp the swing of a rigid load as one or two damp that of a point."""
     thrust_filter: Annotated[float, Field(ge=0.0, le=10.0)] = 1.4
     """Time constant of the derivative of the thrust direction, times that bandwidth."""
     max_swing: Annotated[float, Field(gt=0.0, le=100.0)] = 3.0
@@ -257,7 +287,8 @@ class Formation(PositionControlPart, Delays):
         k = self.gain * band
         own = PARAMS.pack(
             team.n, g=team.gravity, m_L=team.load_mass, velocity=k, stiffness=self.stiffness * k * k,
-            band=band, frequency=self.answers(team), rigid=float(team.body is not None), thrust_filter=self.thrust_filter / band,
+            band=band, frequency=self.answers(team), rigid=float(team.body is not None), lag=self.lag,
+            swing=self.swing if team.body is not None and team.n > 2 else 1.0, thrust_filter=self.thrust_filter / band,
             max_swing=self.max_swing, max_push=self.max_push,
             tangent=math.tan(math.radians(self.max_tilt_deg)), total=float(team.masses.sum()),
             m=team.masses, L=team.cable_lengths, least=self.min_thrust * team.masses * team.gravity,
