@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from colift.control.allocation.base import AllocatorPart, Status
+from colift.control.allocation.base import INFO_BALANCE, AllocatorPart, Status
 
 
 def share(now, sees, params, memory, writes):
@@ -19,8 +19,8 @@ def share(now, sees, params, memory, writes):
         return Status.INVALID_FORCE
     weighted = params[:, None] * directions
     np.maximum(-weighted @ np.linalg.pinv(directions.T @ weighted) @ force, 0.0, out=tensions)
-    info[:] = 0.0, np.nan, np.nan, np.nan, np.linalg.norm(tensions @ directions + force), 0.0
-    return Status.CONVERGED if info[4] <= 1e-9 * np.linalg.norm(force) else Status.CLAMPED
+    info[:], info[INFO_BALANCE] = 0.0, np.linalg.norm(tensions @ directions + force)
+    return Status.CONVERGED if info[INFO_BALANCE] <= 1e-9 * abs(force).sum() else Status.CLAMPED
 
 
 class ChargeWeighted(AllocatorPart):

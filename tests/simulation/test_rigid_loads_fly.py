@@ -162,9 +162,31 @@ def test_the_angle_between_two_attitudes_and_its_part_about_the_vertical() -> No
     for name in ("attitude_rms_deg", "attitude_max_deg", "yaw_max_deg"):
         assert found[name] == pytest.approx(20.0)
     point = metrics.compute(Flight(load_mission("hover", {"timing.duration": 0.5})).run())
-    assert all(
-        math.isnan(point[n]) for n in ("attitude_rms_deg", "attitude_max_deg", "yaw_max_deg")
-    )
+    names = ("attitude_rms_deg", "attitude_max_deg", "yaw_max_deg", "max_missing_moment_Nm")
+    assert all(math.isnan(point[name]) for name in names)
+
+
+def test_the_moment_that_an_allocator_leaves_out_is_recorded() -> None:
+    """A bar on two cables, whose centre of mass does not hang below the line through their ends."""
+    load = {**BOX["load"], "centre_of_mass": [0.0, 0.01, 0.0]}
+    flight = {**BOX, "load": load, "drones": {"count": 2}, "timing": {"duration": 0.2}}
+    recording = Flight(load_mission(flight)).run()
+    known = recording["allocator_moment_residual"]
+    ends = recording.mission.team.levers  # level at first
+    pulls = (recording["desired_tensions"][..., None] * recording["desired_directions"])[1]
+    left = np.cross(ends, pulls).sum(axis=0) + recording["moment"][1]
+    assert known[1] == pytest.approx(np.linalg.norm(left), rel=0.05)
+    assert metrics.compute(recording)["max_missing_moment_Nm"] == known.max() > 0.01
+
+
+def test_how_often_the_allocator_answers_is_all_but_the_same_to_a_load() -> None:
+    """What passes to the drones without a filter is free of the steps of answers that are held."""
+    errors = []
+    for period in (0.001, 0.002, 0.005):
+        timing = {"timing.allocation": period, "timing.duration": 6.0}
+        found = metrics.compute(Flight(load_mission("box-figure-eight", timing)).run())
+        errors.append(found["tracking_max_m"])
+    assert max(errors) < 1.1 * min(errors) < 0.02
 
 
 def planned_by(mission: Mission, times: np.ndarray) -> Planned:

@@ -131,7 +131,7 @@ CONDITIONS = ("attached", "motor_health", "stuck", "allocator_up")
 
 ANSWER = Signal(
     "allocator_info",
-    (6,),
+    (7,),
     "-",
     "-",
     "-",
@@ -235,6 +235,7 @@ CYCLE_SIGNALS = tuple(
         Signal("allocator_optimality_gap", (), "N^2", "-", "-", "objective less the global optimum"),
         Signal("allocator_force_residual", (), "N", "-", "-", "error of the force balance"),
         Signal("allocator_active_limits", (), "1", "-", "-", "bits of the limits at work; 0 without limits"),
+        Signal("allocator_moment_residual", (), "N m", "-", "-", "error of the balance of moments about a rigid load's centre of mass"),
         Signal("allocator_time", (), "s", "-", "-", "measured duration of each allocation"),
     )
 )  # fmt: skip

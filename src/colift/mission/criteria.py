@@ -57,6 +57,7 @@ METRICS = (
     Metric("allocator_failures", "1", "allocations that failed: not the best answer, and no limit to blame"),
     Metric("allocator_silent", "1", "cycles in which the allocator did not answer"),
     Metric("allocator_limited", "1", "allocations whose force had to give way to a limit, or that were regaining the limits"),
+    Metric("max_missing_moment_Nm", "N m", "most that an allocation left out of the wanted moment on a rigid load; none for a point"),
     Metric("allocator_mean_iterations", "1", "mean iterations of an allocation"),
     Metric("allocator_max_iterations", "1", "most iterations of an allocation"),
     Metric("allocator_mean_us", "us", "mean duration of an allocation"),

@@ -456,6 +456,13 @@ def _of_answers(
 
 
 @_metric
+def max_missing_moment_Nm(r: Recording) -> float:
+    if r.mission.load.kind != "rigid":
+        return math.nan
+    return _of_answers(r, "allocator_moment_residual", np.max)
+
+
+@_metric
 def allocator_mean_iterations(r: Recording) -> float:
     return _of_answers(r, "allocator_iterations", np.mean)
 

@@ -92,11 +92,15 @@ def _ask_plainly(  # type: ignore[no-untyped-def]
     return getattr(ask, "py_func", ask)(address, force, reference, beside, *rest)
 
 
-INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE = range(6)
-INFO_SIZE = 6
+INFO_ITERATIONS, INFO_RESIDUAL, INFO_OBJECTIVE, INFO_GAP, INFO_BALANCE, INFO_ACTIVE, INFO_MOMENT = (
+    range(7)
+)
+INFO_SIZE = 7
 
 
-FOR_BODIES = "safe-wrench or wrench-min-norm"
+FOR_BODIES = (
+    "safe-wrench, wrench-min-norm, sqp-wrench, internal-force-wrench or wahba-hoenig-wrench"
+)
 """Allocators for rigid loads, for messages."""
 HOVER_CALLS = 1000
 """Most calls until an allocator is taken to have settled in hover; a plain Python one is asked less often."""
@@ -231,6 +235,8 @@ class Allocation:
         Objective minus the closed-form global optimum, N^2; NaN where no certificate applies.
     force_residual : float
         ``|sum T_i alpha_i + F|``, N.
+    moment_residual : float
+        ``|sum r_i x T_i alpha_i + M|``, N m, with the moment that no cable of this load can make; 0 for one that shares forces only.
     active_limits : int
         Bits of the limits at work, as the allocator names them; 0 for one without limits.
     solve_time : float
@@ -273,6 +279,10 @@ class Allocation:
     @property
     def force_residual(self) -> float:
         return float(self._info[INFO_BALANCE])
+
+    @property
+    def moment_residual(self) -> float:
+        return float(self._info[INFO_MOMENT])
 
     @property
     def active_limits(self) -> int:

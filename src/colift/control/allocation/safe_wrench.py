@@ -14,12 +14,14 @@ from colift.control.allocation.base import (
     INFO_ACTIVE,
     INFO_BALANCE,
     INFO_GAP,
+    INFO_MOMENT,
     INFO_OBJECTIVE,
     INFO_RESIDUAL,
     SIGNATURE,
     Allocator,
     Status,
 )
+from colift.control.allocation.common.wrenches import imbalance
 from colift.control.allocation.limits import elastic, metres
 from colift.control.allocation.limits.cycle import LEVEL as LEAN_MOST
 from colift.control.allocation.limits.cycle import MAX_TURN
@@ -564,6 +566,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         info[INFO_GAP] = math.nan
         info[INFO_OBJECTIVE] = math.nan
         info[INFO_BALANCE] = math.nan
+        info[INFO_MOMENT] = math.nan
         return _INVALID_FORCE
     sigma = params[P.sigma]
     unit = 1.0 / sigma
@@ -698,21 +701,18 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         )
 
     J = 0.0
-    rx, ry, rz = force[0], force[1], force[2]
     for i in range(n):
         d = WIDTH * i
         x, y, z = data[d + R.w], data[d + R.w + 1], data[d + R.w + 2]
         for k in range(3):
             J += 0.5 * (data[d + R.w + k] - data[d + R.home + k]) ** 2
+            spare[3 * i + k] = data[d + R.w + k] * sigma
+            ends[3 * i + k] *= params[P.arm_unit]
         t = math.sqrt(x * x + y * y + z * z)
         tensions[i] = t * sigma
         t = 1.0 / t
         directions[i, 0], directions[i, 1], directions[i, 2] = x * t, y * t, z * t
-        rx += tensions[i] * directions[i, 0]
-        ry += tensions[i] * directions[i, 1]
-        rz += tensions[i] * directions[i, 2]
-    balance = math.sqrt(rx * rx + ry * ry + rz * rz)
-    info[INFO_BALANCE] = balance
+    balance, _ = imbalance(force, moment, ends, spare, info)
     info[INFO_OBJECTIVE] = J * sigma * sigma
     info[INFO_GAP] = (J - bound) * sigma * sigma
     bits = at_work(n, rows, pairs, data)

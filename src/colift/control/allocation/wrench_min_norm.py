@@ -8,24 +8,21 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from colift.control.allocation.base import INFO_GAP, SIGNATURE, AllocatorPart, Status
-from colift.control.allocation.common.share import balance, begin, effort
+from colift.control.allocation.base import SIGNATURE, AllocatorPart, Status
+from colift.control.allocation.common.wrenches import begin, nearest
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
-from colift.kernel.math import quaternion, wrench
+from colift.kernel.math import wrench
 from colift.kernel.math.columns import column
-from colift.kernel.rounding import NO_TENSION, UNBALANCED
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array
 from colift.team.plan import plan, shares, spanned
 
-_CONVERGED = int(Status.CONVERGED)
 _ZERO_FORCE = int(Status.ZERO_FORCE)
 _INVALID_FORCE = int(Status.INVALID_FORCE)
-_FORCE_REDUCED = int(Status.FORCE_REDUCED)
 
-PARAMS = Layout(team={"span": 1, "axis": 3, "reach": 1}, drone={"plan": 3, "arm": 3})
+PARAMS = Layout(team={"span": 1, "axis": 3}, drone={"plan": 3, "arm": 3})
 MEMORY = Layout(drone={"w": 3, "end": 3})
 """Both in columns; the plan is that of a unit upward force."""
 P, PLACES = PARAMS.at, PARAMS.spans
@@ -40,13 +37,10 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     n = tensions.shape[0]
     w = column(memory, M.rows, n, COLUMNS.w)
     ends = column(memory, M.rows, n, COLUMNS.end)
-    W = begin(force, tensions, info)
     known, qw, qx, qy, qz = wrench.unit_attitude(sees.estimated_load_attitude)
     wanted, pw, px, py, pz = wrench.unit_attitude(sees.reference_attitude)
-    fx, fy, fz = force[0], force[1], force[2]
-    mx, my, mz = moment[0], moment[1], moment[2]
-    size = math.sqrt(mx * mx + my * my + mz * mz)
-    if not (math.isfinite(W) and math.isfinite(size) and known and wanted):
+    W = begin(known and wanted, force, moment, tensions, info)
+    if not math.isfinite(W):
         return _INVALID_FORCE
     if W == 0.0:
         return _ZERO_FORCE
@@ -55,29 +49,21 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     formation = column(params, P.rows, n, PLACES.plan)
     if sees.formation[0, 2] != 0.0:
         formation = sees.formation.reshape(3 * n)
-    wrench.planned(n, fx, fy, fz, W, cos_yaw, sin_yaw, formation, w)
-    span = params[P.span]
-    ax, ay, az = quaternion.into_world(
-        qw, qx, qy, qz, params[P.axis], params[P.axis + 1], params[P.axis + 2]
+    wrench.planned(n, force[0], force[1], force[2], W, cos_yaw, sin_yaw, formation, w)
+    axis = params[P.axis : P.axis + 3]
+    return nearest(
+        W,
+        force,
+        moment,
+        (qw, qx, qy, qz),
+        params[P.span],
+        axis,
+        ends,
+        w,
+        tensions,
+        directions,
+        info,
     )
-    for _ in range(2):  # the second time removes what rounding left
-        ux, uy, uz, vx, vy, vz = wrench.unmet(n, fx, fy, fz, mx, my, mz, ends, w)
-        wrench.correct(n, span, ax, ay, az, ux, uy, uz, vx, vy, vz, ends, w)
-    for i in range(n):
-        x, y, z = w[3 * i], w[3 * i + 1], w[3 * i + 2]
-        tensions[i] = math.sqrt(x * x + y * y + z * z)
-        if tensions[i] > NO_TENSION * W:
-            directions[i, 0] = x / tensions[i]
-            directions[i, 1] = y / tensions[i]
-            directions[i, 2] = z / tensions[i]
-    effort(W, tensions, info)
-    missing = balance(force, tensions, directions, info) > UNBALANCED * W
-    _, _, _, vx, vy, vz = wrench.unmet(n, fx, fy, fz, mx, my, mz, ends, w)
-    reach = UNBALANCED * (W * params[P.reach] + size)
-    if missing or math.sqrt(vx * vx + vy * vy + vz * vz) > reach:
-        info[INFO_GAP] = math.nan
-        return _FORCE_REDUCED
-    return _CONVERGED
 
 
 class WrenchMinNorm(AllocatorPart):
@@ -88,8 +74,8 @@ class WrenchMinNorm(AllocatorPart):
     (:func:`colift.team.plan.plan`) is a ring of drones that leans with the force and turns with the wanted heading.
     No limit is kept: not of tensions, nor turns, nor distances.
 
-    Two cables, or others that end in one line, make no moment about it, and those on a point load none at all; then
-    the nearest moment that they can make is made, with status ``FORCE_REDUCED``.
+    Two cables, or others that end in one line, make no moment about it, and those on a point load none at all: that is left out
+    (``moment_residual``).
     """
 
     kernel = _allocate
@@ -105,5 +91,4 @@ class WrenchMinNorm(AllocatorPart):
     def params(self, team: Team) -> Vector:
         span, axis = spanned(team)
         forces = shares(team, *self.formation(team))
-        reach = max(float(abs(team.levers).max()), 1e-9)
-        return np.concatenate([[span, *axis, reach], forces.ravel(), team.levers.ravel()])
+        return np.concatenate([[span, *axis], forces.ravel(), team.levers.ravel()])
