@@ -75,23 +75,30 @@ def half_spaces(
 
 
 def least_forces(
-    owners: NDArray[np.intp], normals: Array, force: Array, aim: Array, active: Array
+    owners: NDArray[np.intp],
+    normals: Array,
+    force: Array,
+    aim: Array,
+    active: Array,
+    balance: Array | None = None,
 ) -> tuple[Array, Array, int] | None:
     """Forces (n, 3) nearest to ``aim`` within the half-spaces that add up to ``force``.
 
-    ``active`` (m,) marks the half-spaces at work the last time. Also multipliers (m,) and iterations;
-    ``None`` where there are no such forces.
+    ``active`` (m,) marks the half-spaces at work the last time. ``balance`` (k, 3 n) are other rows than those of the sum, for which
+    ``force`` (k,) is wanted. Also multipliers (m,) and iterations; ``None`` where there are no such forces.
     """
     import daqp
 
     n, m = len(aim), len(owners)
-    rows = np.zeros((3 + m, 3 * n))
-    rows[:3] = np.tile(np.eye(3), n)
+    balance = np.tile(np.eye(3), n) if balance is None else balance
+    k = len(balance)
+    rows = np.zeros((k + m, 3 * n))
+    rows[:k] = balance
     for row, (owner, normal) in enumerate(zip(owners, normals, strict=True)):
-        rows[3 + row, 3 * owner : 3 * owner + 3] = normal
+        rows[k + row, 3 * owner : 3 * owner + 3] = normal
     upper = np.concatenate([force, np.zeros(m)])
     lower = np.concatenate([force, np.full(m, -1e30)])
-    marks = np.concatenate([np.full(3, _EQUALITY), np.where(active > 0.0, _ACTIVE, 0)])
+    marks = np.concatenate([np.full(k, _EQUALITY), np.where(active > 0.0, _ACTIVE, 0)])
     forces, _, flag, details = daqp.solve(
         np.eye(3 * n),
         -aim.ravel(),
@@ -103,7 +110,7 @@ def least_forces(
     )
     if flag != 1:
         return None
-    return np.array(forces).reshape(n, 3), np.array(details["lam"])[3:], int(details["iterations"])
+    return np.array(forces).reshape(n, 3), np.array(details["lam"])[k:], int(details["iterations"])
 
 
 def _solve(problem: Problem) -> Outcome:

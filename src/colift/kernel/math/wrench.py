@@ -37,6 +37,15 @@ def heading(w, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inline
+def yawed(n, cos_yaw, sin_yaw, vectors):  # type: ignore[no-untyped-def]
+    """Turn n vectors (3 n) about the vertical, in place."""
+    for i in range(n):
+        x, y = vectors[3 * i], vectors[3 * i + 1]
+        vectors[3 * i] = cos_yaw * x - sin_yaw * y
+        vectors[3 * i + 1] = sin_yaw * x + cos_yaw * y
+
+
+@inline
 def turned(w, x, y, z, n, vectors, out):  # type: ignore[no-untyped-def]
     """Of n vectors (3 n) in the load's frame those in the world."""
     xx, xy, xz = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)

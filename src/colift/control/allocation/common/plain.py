@@ -16,9 +16,13 @@ from colift.control.allocation.base import (
     INFO_RESIDUAL,
     Status,
 )
-from colift.control.allocation.common.share import balance, begin
+from colift.control.allocation.common.wrenches import begin, imbalance
+from colift.kernel.math.wrench import unit_attitude
+from colift.kernel.rounding import RANK
+from colift.kernel.signals import LEVEL
 from colift.part import Vector
-from colift.team.geometry import Array
+from colift.team.geometry import Array, matrix_of
+from colift.team.plan import wrench_map
 
 _SOLVER_ERRORS = (ArithmeticError, RuntimeError, ValueError)
 
@@ -34,6 +38,9 @@ class Problem(NamedTuple):
     params, memory : vectors of the part.
     shares : (n,) last tensions; equal ones at the start.
     directions : (n, 3) last directions.
+    moment : (3,) wanted moment on a rigid load about the mean of the cables' ends, over ``size``, m.
+    turn : (3, 3) rotation of the load, as measured, from its frame to the world.
+    ends : (n, 3) where the cables end, from their mean, m.
 
     """
 
@@ -44,6 +51,9 @@ class Problem(NamedTuple):
     memory: Vector
     shares: Array
     directions: Array
+    moment: Array
+    turn: Array
+    ends: Array
 
 
 class Outcome(NamedTuple):
@@ -70,10 +80,20 @@ def balanced(pulls: Array, force: Array) -> Array:
     return np.asarray(pulls - np.outer(weights, pulls.sum(axis=0) + force))
 
 
-def plain_kernel(solve: Callable[[Problem], Outcome]) -> Callable[..., int]:
-    """The kernel of a part whose answers come from ``solve``.
+def balanced_wrench(pulls: Array, problem: Problem) -> Array:
+    """The pulls (n, 3), corrected by the least norm to balance force and moment, as far as cables can."""
+    wrench = wrench_map(problem.ends)
+    unmet = wrench @ pulls.ravel() + np.concatenate([problem.force, problem.moment])
+    step = np.linalg.lstsq(wrench, unmet, rcond=RANK)[0]
+    return np.asarray(pulls - step.reshape(pulls.shape))
 
-    The answer's forces are corrected to balance the wanted force. An answer that is not finite, or a
+
+def plain_kernel(
+    solve: Callable[[Problem], Outcome], arms: Callable[[Vector], Array] | None = None
+) -> Callable[..., int]:
+    """The kernel of a part whose answers come from ``solve``; ``arms`` finds the ends (n, 3) of one that shares moments in its parameters.
+
+    The answer's forces are corrected to balance the wanted force, and moment. An answer that is not finite, or a
     solver's error, becomes the last directions with a share that balances the force
     (``NUMERICAL_FAILURE``).
     """
@@ -81,23 +101,32 @@ def plain_kernel(solve: Callable[[Problem], Outcome]) -> Callable[..., int]:
     def kernel(now, sees, params, memory, writes) -> int:  # type: ignore[no-untyped-def]
         force, dt, info = sees.force, now.dt, writes.allocator_info
         tensions, directions = writes.desired_tensions, writes.desired_directions
-        W = begin(force, tensions, info)
+        n, rigid = len(tensions), arms is not None
+        moment = sees.moment if rigid else np.zeros(3)
+        attitude = sees.estimated_load_attitude if rigid else np.array(LEVEL)
+        known, *attitude = unit_attitude(attitude)
+        W = begin(known, force, moment, tensions, info)
         if not math.isfinite(W):
             return int(Status.INVALID_FORCE)
         if W == 0.0:
             return int(Status.ZERO_FORCE)
-        n = len(tensions)
-        unit = force / W
+        unit, turn = force / W, matrix_of(attitude)
+        ends = np.zeros((n, 3)) if arms is None else arms(params) @ turn.T
+        middle = ends.mean(axis=0)
         last = float(np.linalg.norm(tensions @ directions))
         shares = tensions / last if last > 0.0 else np.full(n, 1.0 / n)
+        problem = Problem(
+            unit, W, dt, params, memory, shares, directions.copy(),
+            moment / W - np.cross(middle, unit), turn, ends - middle,
+        )  # fmt: skip
         try:
-            outcome = solve(Problem(unit, W, dt, params, memory, shares, directions.copy()))
+            outcome = solve(problem)
         except _SOLVER_ERRORS:
             outcome = None
         if outcome is None or not np.isfinite(outcome.pulls).all():
             failed = Status.NUMERICAL_FAILURE
             outcome = Outcome(directions / n, failed, 0, math.nan, math.nan, math.nan)
-        pulls = balanced(outcome.pulls, unit)
+        pulls = balanced_wrench(outcome.pulls, problem) if rigid else balanced(outcome.pulls, unit)
         sizes = np.linalg.norm(pulls, axis=1)
         taut = sizes > 1e-12
         directions[taut] = pulls[taut] / sizes[taut, None]
@@ -107,7 +136,7 @@ def plain_kernel(solve: Callable[[Problem], Outcome]) -> Callable[..., int]:
         info[INFO_OBJECTIVE] = outcome.objective * W * W
         info[INFO_GAP] = outcome.gap * W * W
         info[INFO_ACTIVE] = outcome.active
-        balance(force, tensions, directions, info)
+        imbalance(force, moment, ends.ravel(), (tensions[:, None] * directions).ravel(), info)
         return int(outcome.status)
 
     return kernel
