@@ -36,6 +36,15 @@ def test_what_the_missions_own_allocator_was_asked_for_is_asked_of_all() -> None
         assert mission.criteria["tracking_max_m"].max == 0.1
 
 
+def test_drones_on_a_rigid_load_keep_a_distance_and_its_cables_no_angle() -> None:
+    flown = contest(["wrench-min-norm"], ["box-figure-eight"], [0])[
+        "wrench-min-norm", "box-figure-eight"
+    ]
+    assert flown.criteria["min_drone_distance_m"].min == pytest.approx(0.518)
+    assert "min_angle_deg" not in flown.criteria
+    assert flown.criteria["attitude_max_deg"].max == 2.0
+
+
 def test_a_setting_may_be_that_of_one_or_of_all() -> None:
     changes = {"allocation.mu": 0.5, "safe.min_angle_deg": 25.0, "safe.mu": 0.7, "drones.mass": 0.6}
     flown = contest(["safe", "sqp"], ["hover"], [0], changes)

@@ -144,3 +144,24 @@ def test_rows_of_anything_else_need_only_an_allocator_and_numbers() -> None:
     assert said(rows)[0] == (
         "All 2 allocators held all of their flights within every criterion (2 in total)."
     )
+
+
+def test_angles_are_of_points_and_distances_of_rigid_loads() -> None:
+    """Parallel cables on a box count for no angle, nor do the distances on a point."""
+    point = [row(name, min_angle_deg=40.0, min_drone_distance_m=0.1) for name in "ab"]
+    box = [
+        row(name, min_angle_deg=0.0, min_drone_distance_m=far, attitude_rms_deg=0.5)
+        for name, far in (("a", 0.8), ("b", 0.6))
+    ]
+    assert {c.metric for c in judge.criteria_of(point)} == {"tracking_max_m", "min_angle_deg"}
+    alone = {c.metric for c in judge.criteria_of(box)}
+    assert alone == {"tracking_max_m", "min_drone_distance_m", "attitude_rms_deg"}
+    assert "a leads with 0.8 m" in about(box, "Drone distance")
+    a, b = judge.contestants([*point, *box])
+    assert a.values["min_angle_deg"] == b.values["min_angle_deg"] == 40.0
+    assert (a.values["min_drone_distance_m"], b.values["min_drone_distance_m"]) == (0.8, 0.6)
+    costly = [{**r, "tension_integral_Ns": size} for r, size in zip(box, (2.0, 1.0), strict=True)]
+    assert judge.undominated(judge.contestants(costly)) == ["a", "b"]
+    assert judge.undominated(
+        judge.contestants([{**r, "tension_integral_Ns": 1.0} for r in box])
+    ) == ["a"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -24,6 +25,9 @@ PERIOD = 0.01
 
 LEAST_ANGLE = 30.0
 """Least angle between two cables where the mission asks for none, degrees: what the paper calls safe."""
+
+LEAST_DISTANCE = 2.0 * math.sin(math.radians(0.5 * LEAST_ANGLE))
+"""Least distance between two drones on a rigid load, over the shortest cable: what that angle leaves them on a point."""
 
 CONTEST, SPREAD = "contest", "spread"
 """The two studies: who flies how well, and what separation costs."""
@@ -113,12 +117,15 @@ def bounds(mission: Mission) -> dict[str, dict[str, float]]:
     """What every contestant is judged by: the mission's own criteria, those that its own allocator brings included.
 
     Where these name no angle between the cables, it is :data:`LEAST_ANGLE`: a contest in which the
-    drones may meet is none.
+    drones may meet is none. Cables on a rigid load may be parallel: there it is a distance, :data:`LEAST_DISTANCE`.
     """
     found = {
         name: bound.model_dump(exclude_none=True) for name, bound in criteria_of(mission).items()
     }
-    if mission.drones.count > 1:
+    if mission.drones.count > 1 and mission.load.kind == "rigid":
+        least = LEAST_DISTANCE * float(mission.team.cable_lengths.min())
+        found.setdefault("min_drone_distance_m", {"min": round(least, 3)})
+    elif mission.drones.count > 1:
         found.setdefault("min_angle_deg", {"min": LEAST_ANGLE})
     return found
 

@@ -74,7 +74,9 @@ def write_contest(
     field = judge.contestants(contest)
     missions = list(dict.fromkeys(str(row["mission"]) for row in contest))
     # Figures are of flights that were held, which here and there are none.
-    drawings = draw(CONTEST, rows) if any(map(judge.held, contest)) else []
+    loads = {judge.load_of(row) for row in contest if judge.held(row)}
+    shown = {name: entry for name, entry in CONTEST.items() if loads & {*(entry.needs or loads)}}
+    drawings = draw(shown, rows)
     body = [
         "<header><h1>Allocators compared</h1>",
         f'<p class="soft">{escape(" ".join(notes))}</p></header>',

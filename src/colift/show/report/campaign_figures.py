@@ -42,13 +42,19 @@ def _contest(rows: Rows) -> list[Row]:
     return [r for r in rows if r.get("study", "contest") == "contest" and judge.held(r)]
 
 
+def _rigid(rows: Rows) -> list[Row]:
+    """The flights of rigid loads."""
+    return [row for row in rows if judge.load_of(row) == judge.RIGID]
+
+
 @register(
     CONTEST,
     "Separation against tension",
     "One mission, the start as given. Each line is one allocator over the values of the setting that buys "
     "separation with tension, named in the legend; its first and last value stand beside it. Large single "
     "marks are allocators without such a setting. Better is up and to the left; below the dashed line at "
-    "30 degrees drones come close. Medians over time: how a flight begins does not count. Along the lines, flights "
+    "30 degrees drones come close. Medians over time: how a flight begins does not count; of a rigid load the smallest "
+    "distance of two drones takes the angle's place. Along the lines, flights "
     "count that lost neither load nor team, whatever their angle; single marks are of flights that were held.",
 )
 def separation(rows: Rows) -> Figure:
@@ -56,10 +62,12 @@ def separation(rows: Rows) -> Figure:
     swept = [r for r in rows if r.get("study") == "spread" and judge.fate(r) in ("held", "missed")]
     contest = _contest(rows)
     first = (swept or contest)[0]["mission"]
+    rigid = judge.load_of((swept or contest)[0]) == judge.RIGID
+    metric = "min_drone_distance_m" if rigid else "usual_angle_deg"
     for name, look in _looks(rows).items():
         line = sorted((r for r in swept if r["allocator"] == name), key=lambda r: float(r["value"]))
         alone = [r for r in contest if (r["allocator"], r["mission"]) == (name, first)][:1]
-        shown = [(r["mean_total_tension_N"], r["usual_angle_deg"]) for r in line or alone]
+        shown = [(r["mean_total_tension_N"], r[metric]) for r in line or alone]
         label = f"{name}: {line[0]['setting']}" if line else name
         axes.plot(*zip(*shown, strict=True), label=label, markersize=4 if line else 8, **look)
         for row, place, side in zip(
@@ -71,9 +79,12 @@ def separation(rows: Rows) -> Figure:
                 ha="right" if side < 0 else "left",
             )  # fmt: skip
     axes.margins(0.08)
-    _safe_line(axes)
+    if not rigid:
+        _safe_line(axes)
     axes.set_xlabel(f"{first}: mean of the sum of tensions (N)")
-    axes.set_ylabel("usual smallest angle (deg)")
+    axes.set_ylabel(
+        "smallest distance of two drones (m)" if rigid else "usual smallest angle (deg)"
+    )
     style.legend(figure, rows=4)
     return figure
 
@@ -82,9 +93,32 @@ def separation(rows: Rows) -> Figure:
     CONTEST,
     "Smallest angle, mission by mission",
     "Smallest angle between two actual cables: a mark for the mean over the seeds, a bar over their range.",
+    needs=(judge.POINT,),
 )
 def angles(rows: Rows) -> Figure:
-    return _by_mission(rows, "min_angle_deg", "smallest angle (deg)")
+    own = [row for row in rows if judge.load_of(row) == judge.POINT]
+    return _by_mission(own, "min_angle_deg", "smallest angle (deg)", safe=True)
+
+
+@register(
+    CONTEST,
+    "Distance of the drones, mission by mission",
+    "Smallest distance between two drones that carry a rigid load: a mark for the mean over the seeds, a bar over their range.",
+    needs=(judge.RIGID,),
+)
+def distances(rows: Rows) -> Figure:
+    return _by_mission(_rigid(rows), "min_drone_distance_m", "smallest distance (m)")
+
+
+@register(
+    CONTEST,
+    "Attitude, mission by mission",
+    "Root mean square of the angle between a rigid load and its wanted attitude: a mark for the mean over the seeds, a bar over "
+    "their range; the axis is logarithmic.",
+    needs=(judge.RIGID,),
+)
+def attitudes(rows: Rows) -> Figure:
+    return _by_mission(_rigid(rows), "attitude_rms_deg", "attitude RMS (deg)", log=True)
 
 
 @register(
@@ -127,7 +161,13 @@ def time(rows: Rows) -> Figure:
 
 
 def _by_mission(
-    rows: Rows, metric: str, label: str, *, scale: float = 1.0, log: bool = False
+    rows: Rows,
+    metric: str,
+    label: str,
+    *,
+    scale: float = 1.0,
+    log: bool = False,
+    safe: bool = False,
 ) -> Figure:
     contest = _contest(rows)
     figure, (axes,) = style.grid(height=2.8, legend_rows=2)
@@ -151,7 +191,7 @@ def _by_mission(
     if log:
         axes.set_yscale("log")
         style.plain_ticks(axes.yaxis)
-    else:
+    elif safe:
         _safe_line(axes)
     axes.set_ylabel(label)
     style.legend(figure, rows=2)

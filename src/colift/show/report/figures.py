@@ -21,7 +21,7 @@ class Entry(NamedTuple, Generic[Source]):
     caption: str
     draw: Callable[[Source], Figure]
     needs: tuple[str, ...] = ()
-    """Signals without which there is nothing to draw."""
+    """Signals without which there is nothing to draw; of a comparison the kinds of loads."""
     without: tuple[str, ...] = ()
     """Signals with which another figure says more."""
 

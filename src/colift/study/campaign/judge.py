@@ -37,6 +37,8 @@ class Criterion:
         Whether a winner is named; not where chance decides.
     group : str
         One of :data:`GROUPS`.
+    load : str
+        The kind of load of which it says something; empty for all.
 
     """
 
@@ -50,10 +52,12 @@ class Criterion:
     scale: float = 1.0
     ranked: bool = True
     group: str = "Load and cables"
+    load: str = ""
 
     def value(self, flights: Iterable[Mapping[str, Any]]) -> float:
         """The flights' number in ``unit``; NaN without any."""
-        found = [float(flight.get(self.metric, math.nan)) for flight in flights]
+        own = [flight for flight in flights if self.load in ("", load_of(flight))]
+        found = [float(flight.get(self.metric, math.nan)) for flight in own]
         found = [number for number in found if not math.isnan(number)]
         return self.scale * self.gather(found) if found else math.nan
 
@@ -75,14 +79,26 @@ class Criterion:
         return abs(value - best) <= max(self.tie[0], self.tie[1] * abs(best))
 
 
+POINT, RIGID = "point", "rigid"
+"""Kinds of loads."""
+
+
+def load_of(flight: Mapping[str, Any]) -> str:
+    """Kind of a flight's load: only a rigid one has an attitude to be judged."""
+    return POINT if math.isnan(float(flight.get("attitude_rms_deg", math.nan))) else RIGID
+
+
 GROUPS = ("Load and cables", "Tension", "The allocator itself")
 """Groups of criteria that are shown as one table where there is little room."""
 
 CRITERIA = (
     Criterion("tracking_rms_m", "tracking RMS", "cm", statistics.fmean, "mean", (0.05, 0.05), scale=100.0),
     Criterion("tracking_max_m", "tracking max", "cm", max, "worst", (0.1, 0.05), scale=100.0),
-    Criterion("min_desired_angle_deg", "wanted angle", "deg", min, "worst", (1.0, 0.0), high=True),
-    Criterion("min_angle_deg", "actual angle", "deg", min, "worst", (1.0, 0.0), high=True),
+    Criterion("attitude_rms_deg", "attitude RMS", "deg", statistics.fmean, "mean", (0.05, 0.05), load=RIGID),
+    Criterion("attitude_max_deg", "attitude max", "deg", max, "worst", (0.1, 0.05), load=RIGID),
+    Criterion("min_desired_angle_deg", "wanted angle", "deg", min, "worst", (1.0, 0.0), high=True, load=POINT),
+    Criterion("min_angle_deg", "actual angle", "deg", min, "worst", (1.0, 0.0), high=True, load=POINT),
+    Criterion("min_drone_distance_m", "drone distance", "m", min, "worst", (0.01, 0.0), high=True, load=RIGID),
     Criterion("slack_time_s", "slack", "s", sum, "total", (0.01, 0.02), group=GROUPS[1]),
     Criterion("peak_tension_N", "peak tension", "N", max, "worst", group=GROUPS[1]),
     Criterion("tension_integral_Ns", "tension integral", "N s", statistics.fmean, "mean", (0.0, 0.01), group=GROUPS[1]),
@@ -91,14 +107,16 @@ CRITERIA = (
     Criterion("allocator_p99_us", "time p99", "us", statistics.median, "median", (0.1, 0.2), group=GROUPS[2]),
     Criterion("allocator_max_us", "time worst", "us", max, "worst", ranked=False, group=GROUPS[2]),
     Criterion("allocator_limited", "reduced", "cycles", sum, "total", ranked=False, group=GROUPS[2]),
+    Criterion("max_missing_moment_Nm", "missing moment", "N m", max, "worst", ranked=False, group=GROUPS[2], load=RIGID),
     Criterion("allocator_failures", "not ok", "cycles", sum, "total", (0.0, 0.0), group=GROUPS[2]),
 )  # fmt: skip
 """The columns of ``colift compare``; the allocator's time is the kernel's alone."""
 
-SEPARATION, EFFORT = (
-    next(c for c in CRITERIA if c.metric == name) for name in ("min_angle_deg", "tension_integral_Ns")
-)  # fmt: skip
-"""The two that pull in opposite directions."""
+ANGLE, DISTANCE, EFFORT = (
+    next(c for c in CRITERIA if c.metric == name)
+    for name in ("min_angle_deg", "min_drone_distance_m", "tension_integral_Ns")
+)
+"""Separation of cables on a point, of drones around a rigid load, and the tension that either costs."""
 
 
 @dataclass(frozen=True)
@@ -152,8 +170,10 @@ def held(row: Mapping[str, Any]) -> bool:
 
 def criteria_of(rows: Iterable[Mapping[str, Any]]) -> list[Criterion]:
     """The criteria that the rows have numbers for."""
+    rows = list(rows)
     names = {name for row in rows for name in row}
-    return [criterion for criterion in CRITERIA if criterion.metric in names]
+    loads = {"", *(load_of(row) for row in rows if str(row.get("status") or "flown") == "flown")}
+    return [c for c in CRITERIA if c.metric in names and c.load in loads]
 
 
 def contestants(rows: Sequence[Mapping[str, Any]]) -> list[Contestant]:
@@ -186,7 +206,8 @@ def undominated(field: Sequence[Contestant]) -> list[str]:
 
     Beaten is who is clearly behind in one of the two and at best level in the other.
     """
-    both = (SEPARATION, EFFORT)
+    angles = any(not math.isnan(c.values.get(ANGLE.metric, math.nan)) for c in field)
+    both = (ANGLE if angles else DISTANCE, EFFORT)
 
     def value(c: Contestant, criterion: Criterion) -> float:
         return c.values.get(criterion.metric, math.nan)
