@@ -1,32 +1,44 @@
-"""Write how the safe allocator for rigid loads does, cycle by cycle (docs/theory/rigid-allocation.md): limits, misses, time.
+"""Write how the allocators for rigid loads do, cycle by cycle (docs/theory/rigid-allocation.md): limits, misses, time.
 
 A box of 0.5 kg, 0.6 x 0.4 x 0.2 m, on cables of 1 m that end on its upper edges, drones of 0.5 kg, 100 Hz. The wrench is that of a
 smooth motion with attitude, the same with white noise on force, moment and measured attitude, or steps of both.
 
-Every answer is judged by code that the allocator does not call. A miss is *proved* by a plane in the space of wrenches that parts the
-wanted one from all that cables within their tensions, cone and turns can make; what is not proved counts as avoidable.
+Every answer is judged by code that the allocator does not call, and by the limits of ``safe-wrench``. Of that one a miss is *proved* by a plane in the space of wrenches that parts the
+wanted one from all that cables within their tensions, cone and turns can make; what is not proved counts as avoidable. Of two cables, whose
+wrenches have five dimensions, nothing is proved.
 
-From ``rigid_allocation.json`` beside this file: ``python docs/figures/rigid_allocation.py [--fly] [--cycles 100000] [--drones 3 4]``;
-``--fly`` measures anew, with other ``--cycles`` or ``--drones`` only to be looked at.
+From ``rigid_allocation.json`` beside this file: ``python docs/figures/rigid_allocation.py [--fly] [--times] [--kinds safe-wrench]
+[--drones 3 4] [--cases smooth] [--cycles 1000]``. ``--fly`` measures the rows of these kinds, drones and cases anew, all when left out, but
+for their times, which ``--times`` measures on a machine that does nothing else. With ``--cycles`` rows are only shown.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from pages import fill, stored, table
+from pages import fill, table
 from scipy.stats import beta
 
-from colift.control.allocation.base import INFO_SIZE, Beside, Status, ask
+from colift.control.allocation.base import (
+    INFO_SIZE,
+    Allocator,
+    AllocatorPart,
+    Beside,
+    Status,
+    ask,
+)
 from colift.control.allocation.limits.reach import farthest
 from colift.control.allocation.safe_wrench import MEMORY, PRICES, SafeWrench, outward
 from colift.kernel.jit import address_of, monotonic_ns
+from colift.part import find
 from colift.team import Body, Team
 from colift.team.geometry import matrix_of
 from colift.team.load import box_inertia, usual_attachments
@@ -36,12 +48,25 @@ Array = NDArray[np.float64]
 PERIOD = 0.01
 SIZE = np.array([0.6, 0.4, 0.2])
 MASS = 0.5
-CYCLES, DRONES = 100_000, [3, 4, 6, 8]
-DISTANCE = 0.5
+SAFE = "safe-wrench"
+CYCLES = {
+    SAFE: 100_000, "wrench-min-norm": 100_000, "internal-force-wrench": 100_000, "sqp-wrench": 100_000, "wahba-hoenig-wrench": 10_000,
+}  # fmt: skip
+"""Of each case, by allocator; what runs in Python is a thousand times slower."""
+DRONES = [2, 3, 4, 6, 8]
+MORE = [12, 16]
+"""For ``safe-wrench`` alone."""
+DISTANCE, CLOSE = 0.5, 0.3
+"""That drones keep, m; the latter for more than eight, who find no other room around the box."""
 REPEATS = 5
 SEED = 20261128  # no choice of a constant has seen it
 MISSED = 1e-6
 CASES = ("smooth", "white 0.1", "white 0.3", "raw steps", "slewed steps")
+
+
+def judge_of(n: int) -> SafeWrench:
+    """The limits by which all are judged."""
+    return SafeWrench(min_distance=DISTANCE if n <= max(DRONES) else CLOSE)
 
 
 def team_of(n: int) -> Team:
@@ -148,11 +173,12 @@ def _run(address, asked, dt, params, memory, tensions, directions, info, at, out
     pulls, state, multipliers, times = out
     n = tensions.shape[0]
     reference, nominal = np.zeros((4, 3)), np.full((n, 3, 3), np.nan)
+    own = np.zeros((n, 3))  # no formation but its own
     for k in range(asked.force.shape[0]):
         reference[2] = asked.acceleration[k]
         beside = Beside(
-            asked.moment[k], asked.attitude[k], asked.rates[k], asked.measured[k], nominal
-        )
+            asked.moment[k], asked.attitude[k], asked.rates[k], asked.measured[k], nominal, own
+        )  # fmt: skip
         force = asked.force[k]
         begin = monotonic_ns()
         state[k, 0] = ask(
@@ -174,20 +200,35 @@ class Run(NamedTuple):
     times: Array
 
 
-def run(part: SafeWrench, team: Team, what: Asked) -> Run:
+def run(part: AllocatorPart, team: Team, what: Asked) -> Run:
     """Ask for everything, cycle by cycle, from the plan's formation."""
     cycles, n = len(what.force), team.n
+    compiled = hasattr(type(part).kernel, "py_func")
     out = Run(
         np.zeros((cycles, n, 3)),
         np.zeros((cycles, 1 + INFO_SIZE)),
         np.zeros((cycles, 6)),
         np.zeros(cycles),
     )
-    directions, tensions = part.formation(team)
-    _run(
-        address_of(type(part).kernel), what, PERIOD, part.params(team), part.memory(team), tensions.copy(),
-        np.ascontiguousarray(directions), np.zeros(INFO_SIZE), MEMORY.at.lam, tuple(out),
-    )  # fmt: skip
+    directions, tensions = judge_of(n).formation(team)
+    if compiled:
+        at = MEMORY.at.lam if isinstance(part, SafeWrench) else 0
+        memory = np.concatenate([part.memory(team), np.zeros(6)])
+        _run(
+            address_of(type(part).kernel), what, PERIOD, part.params(team), memory[:-6], tensions.copy(),
+            np.ascontiguousarray(directions), np.zeros(INFO_SIZE), at, tuple(out),
+        )  # fmt: skip
+        return out
+    allocator = Allocator(part, team, dt=PERIOD)
+    allocator.reset(directions, tensions)
+    for k in range(cycles):
+        answer = allocator.allocate(
+            what.force[k], what.acceleration[k], moment=what.moment[k], attitude=what.measured[k],
+            wanted_attitude=what.attitude[k],
+        )  # fmt: skip
+        out.pulls[k] = answer.tensions[:, None] * answer.directions
+        out.state[k, :2] = answer.status, answer.iterations
+        out.times[k] = 1e9 * answer.solve_time
     return out
 
 
@@ -197,12 +238,23 @@ def places(team: Team, attitude: Array) -> Array:
     return np.einsum("kij,nj->kni", turns, team.levers)
 
 
+def possible(team: Team, what: Asked) -> Array:
+    """The wanted moments (cycles, 3), N m; of two cables without that about the line of their ends, which they cannot make."""
+    if team.n != 2:
+        return what.moment
+    ends = places(team, what.measured)
+    line = ends[:, 1] - ends[:, 0]
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    free = np.cross(ends.mean(axis=1), what.force)
+    return np.asarray(
+        what.moment - np.sum((what.moment - free) * line, axis=1, keepdims=True) * line
+    )
+
+
 def missed(team: Team, what: Asked, pulls: Array) -> Array:
     """What of the wrench is missing (cycles, 6): N, N m."""
-    ends = places(team, what.measured)
-    return np.concatenate(
-        [pulls.sum(axis=1) + what.force, np.cross(ends, pulls).sum(axis=1) + what.moment], axis=1
-    )
+    moments = np.cross(places(team, what.measured), pulls).sum(axis=1) + possible(team, what)
+    return np.concatenate([pulls.sum(axis=1) + what.force, moments], axis=1)
 
 
 def loss(team: Team, miss: Array) -> Array:
@@ -279,7 +331,7 @@ def bounds(
     along = answers.pulls / np.linalg.norm(answers.pulls, axis=2, keepdims=True)
     start, _ = part.formation(team)
     before = np.concatenate([start[None], along[:-1]])
-    wrenches = np.concatenate([what.force / share, what.moment / (share * arm)], axis=1)
+    wrenches = np.concatenate([what.force / share, possible(team, what) / (share * arm)], axis=1)
     out = np.zeros(len(which))
     _bounds(
         which, answers.multipliers, wrenches, places(team, what.measured) / arm, before,
@@ -292,7 +344,7 @@ def bounds(
 def violations(part: SafeWrench, team: Team, what: Asked, pulls: Array) -> dict[str, float]:
     """How far any answer is beyond each limit: N, degrees, m; negative where all are within."""
     tensions = np.linalg.norm(pulls, axis=2)
-    along = pulls / tensions[..., None]
+    along = pulls / np.maximum(tensions, 1e-12)[..., None]  # some leave cables slack
     start, _ = part.formation(team)
     before = np.concatenate([start[None], along[:-1]])
     turned = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(along - before, axis=2), 1.0))
@@ -349,39 +401,59 @@ def rod_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
     return np.where(inside, np.abs(np.sum((c - a) * normal, axis=1)) / np.sqrt(square), best)
 
 
-def measured(n: int, case: str, cycles: int) -> dict[str, Any]:
-    """One row."""
-    team = team_of(n)
-    part = SafeWrench(min_distance=DISTANCE)
-    what = asked(case, cycles, team, part.turn_rate(team))
+def part_of(kind: str, n: int) -> AllocatorPart:
+    """An allocator with its defaults; the safe one keeps drones apart."""
+    return judge_of(n) if kind == SAFE else find("allocation", kind)()
+
+
+def measured(kind: str, n: int, case: str, cycles: int) -> dict[str, Any]:
+    """One row, but for its times."""
+    team, part = team_of(n), part_of(kind, n)
+    what = asked(case, cycles, team, judge_of(n).turn_rate(team))
     answers = run(part, team, what)
-    for _ in range(REPEATS - 1):  # the same calls again: what is longer was interrupted
-        np.minimum(answers.times, run(part, team, what).times, out=answers.times)
     miss = missed(team, what, answers.pulls)
     which = np.flatnonzero(np.abs(miss).max(axis=1) > MISSED)
-    least = bounds(part, team, what, answers, which, 300)
-    lost = loss(team, miss[which])
-    hard = np.flatnonzero((least <= MISSED) | (lost > 1.1 * least))
-    least[hard] = bounds(part, team, what, answers, which[hard], 20_000)
-    proved = least > MISSED
-    ratios = lost[proved] / least[proved]
     statuses = answers.state[:, 0]
     return {
+        "kind": kind,
         "n": n,
         "case": case,
         "cycles": cycles,
         "iterations": float(answers.state[:, 1].mean()),
         "most_iterations": int(answers.state[:, 1].max()),
         "missed": len(which),
+        **(proofs(team, what, answers, miss, which) if kind == SAFE and n > 2 else {}),
+        "not_converged": int(np.sum(statuses == Status.ITERATION_LIMIT)),
+        "recovering": int(np.sum(statuses == Status.RECOVERING)),
+        "failed": int(np.sum(statuses == Status.NUMERICAL_FAILURE)),
+        **violations(judge_of(n), team, what, answers.pulls),
+    }
+
+
+def proofs(team: Team, what: Asked, answers: Run, miss: Array, which: Array) -> dict[str, Any]:
+    """How many of the misses nothing proves, and how much more is lost than what is proved."""
+    least = bounds(judge_of(team.n), team, what, answers, which, 300)
+    lost = loss(team, miss[which])
+    hard = np.flatnonzero((least <= MISSED) | (lost > 1.1 * least))
+    least[hard] = bounds(judge_of(team.n), team, what, answers, which[hard], 20_000)
+    proved = least > MISSED
+    ratios = lost[proved] / least[proved]
+    return {
         "avoidable": int(np.sum(~proved)),
         "avoidable_loss": float(lost[~proved].max(initial=0.0)),
         "loss": float(lost[proved].sum() / least[proved].sum()) if proved.any() else 1.0,
         "over_1_1": int(np.sum(ratios > 1.1)),
-        "not_converged": int(np.sum(statuses == Status.ITERATION_LIMIT)),
-        "recovering": int(np.sum(statuses == Status.RECOVERING)),
-        "us": [float(q) * 1e-3 for q in np.quantile(answers.times, [0.5, 0.99, 1.0])],
-        **violations(part, team, what, answers.pulls),
     }
+
+
+def timed(kind: str, n: int, case: str, cycles: int) -> list[float]:
+    """Times of a call, us: median, 99th percentile and worst."""
+    team, part = team_of(n), part_of(kind, n)
+    what = asked(case, cycles, team, judge_of(n).turn_rate(team))
+    times = run(part, team, what).times
+    for _ in range(REPEATS - 1):  # the same calls again: what is longer was interrupted
+        np.minimum(times, run(part, team, what).times, out=times)
+    return [float(q) * 1e-3 for q in np.quantile(times, [0.5, 0.99, 1.0])]
 
 
 def share(count: int, cycles: int) -> str:
@@ -396,39 +468,73 @@ def interval(count: int, cycles: int) -> str:
     return f"{share(count, cycles)} ({100.0 * low:.3f}-{100.0 * high:.3f})"
 
 
+def cases(args: argparse.Namespace) -> list[tuple[str, int, str]]:
+    """Allocator, drones and case of every row that is asked for."""
+    return [
+        (kind, n, case)
+        for kind in args.kinds or CYCLES
+        for n in args.drones or [*DRONES, *(MORE if kind == SAFE else [])]
+        for case in args.cases or CASES
+    ]
+
+
+def line_of(row: dict[str, Any]) -> list[str]:
+    """A row of the table."""
+    metres = max(value for name, value in row.items() if name.endswith(", m"))
+    limits = ("tension, N", "turn, deg", "cone, deg", "box, deg", "drones, m", "cables, m")
+    broken = [
+        f"{name.split(',')[0]} {row[name]:.2g}{name.split(',')[1]}"
+        for name in limits
+        if row[name] > 1e-6
+    ]
+    proved = "avoidable" in row
+    return [
+        str(row["n"]),
+        row["case"],
+        f"{row['iterations']:.2f} / {row['most_iterations']}",
+        share(row["missed"], row["cycles"]),
+        interval(row["avoidable"], row["cycles"]) if proved else "-",
+        f"{row['loss']:.3f}" if proved and row["missed"] else "-",
+        f"{-1e3 * metres:+.1f} mm",
+        ", ".join(broken) or "kept",
+        " / ".join(f"{us:.1f}" for us in row["us"]) if row.get("us") else "-",
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fly", action="store_true")
-    parser.add_argument("--cycles", type=int, default=CYCLES)
-    parser.add_argument("--drones", type=int, nargs="*", default=DRONES)
+    parser.add_argument("--times", action="store_true")
+    parser.add_argument("--cycles", type=int)
+    parser.add_argument("--kinds", nargs="*")
+    parser.add_argument("--drones", type=int, nargs="*")
+    parser.add_argument("--cases", nargs="*")
     args = parser.parse_args()
-    cases = [(n, case) for n in args.drones for case in CASES]
-    if args.fly and (args.cycles != CYCLES or args.drones != DRONES):
-        for n, case in cases:
-            print(measured(n, case, args.cycles), flush=True)
+    if args.cycles:
+        for case in cases(args):
+            print(measured(*case, args.cycles), flush=True)
         return
-    rows = []
-    for row in stored(__file__, lambda: [measured(n, case, CYCLES) for n, case in cases]):
-        metres = max(value for name, value in row.items() if name.endswith(", m"))
-        others = max(row["tension, N"], row["turn, deg"], row["cone, deg"], row["box, deg"])
-        median, late, longest = row["us"]
-        rows.append(
-            [
-                str(row["n"]),
-                row["case"],
-                f"{row['iterations']:.2f} / {row['most_iterations']}",
-                share(row["missed"], row["cycles"]),
-                interval(row["avoidable"], row["cycles"]),
-                f"{row['loss']:.3f}" if row["missed"] else "-",
-                f"{-1e3 * metres:+.1f} mm",
-                "kept" if max(metres, others) <= 1e-6 else f"broken by {max(metres, others):.2g}",
-                f"{median:.1f} / {late:.1f} / {longest:.1f}",
-            ]
-        )
+    file = Path(__file__).with_suffix(".json")
+    rows = {
+        (row["kind"], row["n"], row["case"]): row
+        for row in json.loads(file.read_text(encoding="utf-8"))
+    }
+    for case in cases(args) if args.fly or args.times else []:
+        row, cycles = rows.get(case, {}), CYCLES[case[0]]
+        if args.fly:
+            row = {**measured(*case, cycles), "us": row.get("us")}
+        if args.times:
+            row["us"] = timed(*case, cycles)
+        rows[case] = row
+        file.write_text(json.dumps(list(rows.values()), indent=1, allow_nan=False) + "\n")
+        print(*line_of(row), sep=" | ", flush=True)
     header = [
         "n", "case", "iterations, mean / most", "missed, %", "avoidable, % (95 %)", "loss", "closest", "limits", "us, median / 99 % / worst",
     ]  # fmt: skip
-    fill("theory/rigid-allocation.md", "rigid-allocation", table(header, rows))
+    order = sorted(rows.values(), key=lambda row: (row["n"], CASES.index(row["case"])))
+    for kind in CYCLES:
+        block, own = f"rigid-{kind}", [line_of(row) for row in order if row["kind"] == kind]
+        fill("theory/rigid-allocation.md", block, table(header, own))
 
 
 if __name__ == "__main__":
