@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from colift.control.allocation.base import AllocatorPart
 from colift.control.reference.base import ReferencePart
 from colift.kernel.math import leaning
-from colift.mission.planned import ROOM, STEP, most_asked, wanted
+from colift.mission.planned import ROOM, STEP, TAUT, most_asked, wanted
 from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array
@@ -33,6 +33,8 @@ PACES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2)
 """At which a reference is flown on, over its own: the fastest at which its plan asks no more of the rotors than may be planned."""
 TIMES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """In which a load comes to lean, s."""
+CALM = 0.3
+"""Share of the rotors' angular acceleration that a plan may ask of a team that has just changed: most of them are for coming to rest."""
 FEWEST = 3
 """Cables that hold all of a rigid load's attitude."""
 
@@ -124,7 +126,7 @@ def outlook(
         times, poses = wanted(team, flown, first, max(last, first + 0.1))
         for pace in PACES:
             most = most_asked(team, parts, times, poses, pace=pace)
-            if most is None or most.within:
+            if most is None or (most.share <= CALM and most.taut >= TAUT):
                 within = 0.0
                 if before is not None:
                     _, wanted_now, _ = flown.pose(team, first)

@@ -13,24 +13,25 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
-from colift.part import Vector
+from colift.part import Places, Vector
 from colift.team import Team
 
 PARAMS = Layout(
     team={
         "filter": 1, "hold": 1, "speed": 1, "length": 1, "learning": 1, "deficit": 1, "frozen": 1,
-        "g": 1, "astray": 1, "tug": 1,
+        "g": 1, "astray": 1, "tug": 1, "grace": 1,
     },
     drone={"m": 1},
 )  # fmt: skip
 MEMORY = Layout(
+    team={"changed": 1},
     drone={
         "started": 1, "length": 1, "distance": 1, "speed": 1, "velocity": 3, "expected": 3,
         "cable": 1, "thrust": 1, "still": 1, "ages": 2, "now": 1, "steady": 1, "lack": 3,
         "counts": 1, "reeled": 1,
     }
 )  # fmt: skip
-"""Filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
+"""How long ago the team ``changed``, s; 0 where that is no matter any more. Of each drone filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
 ``thrust`` last; time without anything new (``still``) of tracking and attitude, and their ``ages``; whether the distance
 changes faster than that of a taut cable (``now``), and time in which it did not (``steady``); the acceleration that lacks
 (``lack``), and whether it ``counts`` as wind for the others."""
@@ -38,6 +39,8 @@ P, M = PARAMS.at, MEMORY.at
 
 BRAKED = 0.8
 """Speed over its filtered value below which the ends of a cable are stopped: it has come taut, and is not cut."""
+SOON, GRACE = 1e-9, 4.0
+"""Just after a change of the team, and how long a rigid load takes to hang anew, s."""
 LEAST_UP = 0.5
 """Least vertical part of the axis by which a drone alone judges its thrust."""
 
@@ -74,6 +77,11 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     learn, deficit, g = params[P.learning], params[P.deficit], params[P.g]
     frozen, astray, tug = params[P.frozen], params[P.astray], params[P.tug]
     keep = decay(dt, params[P.filter])
+    if memory[M.changed] > 0.0:
+        memory[M.changed] += dt
+        if memory[M.changed] > params[P.grace]:
+            memory[M.changed] = 0.0
+    settles = memory[M.changed] > 0.0
     moving = windy = across = along = 0.0
     for i in range(n):
         o = M.rows + M.width * i
@@ -121,7 +129,7 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             memory[o + M.length] += dt / memory[o + M.steady] * stretch
         known = memory[o + M.steady] > 0.5 * learn
         apart = changing and memory[o + M.speed] > 0.0 and speed > BRAKED * memory[o + M.speed]
-        apart = apart and known and stretch > longer
+        apart = apart and known and stretch > longer and not settles
         memory[o + M.cable] = memory[o + M.cable] + dt if apart else 0.0
 
         still = True
@@ -149,6 +157,7 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         )
         lacking = _lacking(i, axis, windy, across, along, memory)
         weak = thrusts[i] > 0.0 and m * lacking > deficit * max(thrusts[i], 0.5 * m * g)
+        weak = weak and not settles
         memory[o + M.thrust] = memory[o + M.thrust] + dt if weak else 0.0
         # If most distances change, it is the load that is seen wrongly, or let go.
         if memory[o + M.cable] >= hold and (n == 1 or 2.0 * moving <= n):
@@ -203,9 +212,22 @@ class Residuals(DetectionPart):
     tug: Annotated[float, Field(ge=0.0, le=10.0)] = 0.2
     """Time for which thrust must lack on a cable that stays taut, s."""
 
+    grace: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
+    """Time after a change of the team for which neither cables nor thrusts are judged, s. None: 4 with a rigid load, whose cables go slack and
+    come taut until it hangs on those that are left; else none."""
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        kept = super().carry_over(old, fresh, places)
+        MEMORY.view(kept, "changed")[:] = SOON
+        return kept
+
+    def grace_of(self, team: Team) -> float:
+        """The grace for this team, s."""
+        return (0.0 if team.body is None else GRACE) if self.grace is None else self.grace
+
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(
             team.n, filter=self.filter, hold=self.hold, speed=self.speed, length=self.length,
             learning=self.learning, deficit=self.deficit, frozen=self.frozen, g=team.gravity,
-            astray=self.astray, tug=self.tug, m=team.masses,
+            astray=self.astray, tug=self.tug, m=team.masses, grace=self.grace_of(team),
         )  # fmt: skip
