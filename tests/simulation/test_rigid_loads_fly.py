@@ -255,6 +255,17 @@ def test_a_box_that_loses_a_corner_goes_on_leaning_so_that_the_corner_sinks() ->
     assert found["attitude_max_deg"] < 10.0
 
 
+def test_a_team_that_is_put_together_anew_in_full_motion_flies_on_as_if_nothing_were() -> None:
+    """Cables that are led turn as they did: the plan's derivatives are known only after some cycles, and are no correction."""
+    flight = Flight(load_mission("box-figure-eight", {"timing.duration": 10.0}))
+    flight.advance(6.5)
+    flight.regroup(flight.drones)
+    flight.advance(3.5)
+    recording = flight.recording(since=6.5)
+    assert np.degrees(np.linalg.norm(metrics.attitude_error(recording), axis=1)).max() < 0.5
+    assert np.linalg.norm(metrics.tracking_error(recording), axis=1).max() < 0.005
+
+
 def test_two_cables_do_not_hold_a_box_and_it_comes_down() -> None:
     events = [{"at": 1.0 + i, "field": "drones.lose", "value": i} for i in range(2)]
     recording = Flight(load_mission({**BOX, "events": events})).run()

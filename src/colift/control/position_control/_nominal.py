@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from colift.control.position_control._cable import course_of, size_of
 from colift.kernel.jit import aside, inline
 from colift.kernel.layout import Layout
 from colift.kernel.math import inertial, quaternion, wrench
@@ -135,9 +136,11 @@ def keep_courses(n, state, memory, first, width):  # type: ignore[no-untyped-def
 
     The directions, with rates, that are led stand ``width`` apart from ``first`` on, as :func:`colift.control.position_control._cable.lead` keeps them.
     """
+    pulls = state[state.shape[0] - 9 * n :].reshape(n, 3, 3)
     for i in range(n):
-        w, o = state.shape[0] - 9 * n + 9 * i, first + width * i
-        T = (state[w] ** 2 + state[w + 1] ** 2 + state[w + 2] ** 2) ** 0.5
+        o = first + width * i
+        T, T1, T2 = size_of(i, pulls)
         for k in range(3):
-            memory[o + FOLLOW + k] = memory[o + k] - state[w + k] / max(T, 1e-9)
-            memory[o + FOLLOW + 3 + k] = memory[o + 3 + k]
+            direction, rate, _ = course_of(i, k, pulls, T, T1, T2)
+            memory[o + FOLLOW + k] = memory[o + k] - direction
+            memory[o + FOLLOW + 3 + k] = memory[o + 3 + k] - rate

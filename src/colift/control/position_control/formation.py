@@ -107,7 +107,8 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
     stands = sees.standing[n] != 0.0
     if params[P.rigid] > 0.0:
         own, kept = params[P.rows + P.width * n :], memory[M.rows + M.width * n :]
-        replanned = kept[0] == 0.0 and memory[M.rows + M.started] != 0.0
+        # Until the plan's derivatives are known: what is led has them already.
+        replanned = kept[0] < 2.0 and memory[M.rows + M.started] != 0.0
         plan_pulls(
             n, sees.formation, reference, sees.reference_attitude, sees.reference_rates, sees.learned_load, dt, keep_plan, own, kept
         )  # fmt: skip
