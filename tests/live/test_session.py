@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from colift.errors import ColiftError
 from colift.flight.flight import Flight
@@ -15,7 +16,7 @@ from colift.mission.load import load_mission
 from colift.record.recording import Recording
 from colift.show.live import session as module
 from colift.show.live.pilot import Pilot
-from colift.team.geometry import pairwise_angles
+from colift.team.geometry import matrix_of, pairwise_angles
 
 
 def last(hand):
@@ -316,6 +317,87 @@ def test_commands_wait_in_a_bounded_queue(start):
         hand.session.submit(lambda s: s.pause(), hand.refusals.append)
     assert len(hand.refusals) == 300 - 256
     assert set(hand.refusals) == {"too many commands are waiting"}
+
+
+# ---------------------------------------------------------------- a rigid load
+
+
+def tilted(hand):
+    """Angle between the load's attitude and the wanted one, rad."""
+    row = last(hand)
+    return 2.0 * np.arccos(min(1.0, abs(row["load_attitude"] @ row["reference_attitude"])))
+
+
+def test_only_a_rigid_load_has_knobs_that_turn_it(start):
+    assert not [name for name in start().session.knobs if name.startswith("reference.")]
+    hand = start("box-figure-eight")
+    names = [name for name in hand.session.knobs if name.startswith("reference.")]
+    assert names == ["reference.roll", "reference.pitch", "reference.yaw"]
+
+
+def test_a_box_turns_to_the_pose_that_is_asked_for_without_a_jump(start):
+    hand = start("box-figure-eight", timing__recording=0.001)
+    hand.fly(6.5)  # full speed, rolled, pitched and turned
+    hand.do(lambda s: s.turn("reference.yaw", 60.0), seconds=0.5)
+    hand.do(lambda s: s.turn("reference.roll", 10.0), seconds=0.5)
+    hand.do(lambda s: s.target((0.5, 0.5, 1.2)), seconds=0.5)
+    hand.do(lambda s: s.turn("reference.pitch", -8.0), seconds=9.0)
+    assert hand.refusals == []
+    row = last(hand)
+    wanted = Rotation.from_euler("ZYX", [60.0, -8.0, 10.0], degrees=True).as_matrix()
+    np.testing.assert_allclose(matrix_of(row["reference_attitude"]), wanted, atol=1e-9)
+    assert np.degrees(tilted(hand)) < 0.5
+    np.testing.assert_allclose(row["load"], (0.5, 0.5, 1.2), atol=0.01)
+    values = hand.session.state["values"]
+    assert [values[f"reference.{name}"] for name in ("roll", "pitch", "yaw")] == pytest.approx(
+        [10.0, -8.0, 60.0]
+    )
+    r = hand.session.flight.recording()
+    q, rates = r["reference_attitude"], r["reference_rates"]
+    turned = 2.0 * np.sqrt(np.maximum(0.0, 1.0 - np.sum(q[1:] * q[:-1], axis=1) ** 2))
+    assert turned.max() < 0.001 * np.radians(80.0)  # at full speed the eight turns at 60 deg/s
+    for k in range(2):
+        steps = np.diff(rates[:, k], axis=0)
+        mean = 0.5 * (rates[1:, k + 1] + rates[:-1, k + 1])
+        np.testing.assert_allclose(steps, 0.001 * mean, atol=2e-5)
+
+
+def test_yaw_goes_the_shorter_way_round(start):
+    hand = start("box-figure-eight")
+    hand.fly(0.5)
+    for value in (170.0, -170.0):
+        hand.do(lambda s, value=value: s.turn("reference.yaw", value), seconds=9.0)
+    wanted = hand.session.flight.parts["reference"].attitude_deg
+    assert wanted[2] == pytest.approx(190.0)
+    assert hand.session.state["values"]["reference.yaw"] == pytest.approx(-170.0)
+
+
+def test_a_box_that_loses_a_drone_by_hand_leans_and_goes_on_without_roll(start):
+    hand = start("box-through-poses", timing__duration=100.0)
+    hand.do(lambda s: s.turn("reference.roll", 0.0), seconds=4.0)
+    hand.do(lambda s: s.cut(1), seconds=8.0)
+    assert np.degrees(hand.session.flight.membership.outlook.lean) == pytest.approx(10.0, abs=0.5)
+    assert np.isnan(last(hand)["tensions"][1])
+    assert np.degrees(tilted(hand)) < 2.0
+    assert any("leaning by 10 degrees" in text for text in marks(hand, "change"))
+    hand.do(lambda s: s.turn("reference.yaw", 20.0), seconds=6.0)
+    assert hand.refusals == []
+    assert np.degrees(tilted(hand)) < 2.0
+
+
+def test_a_box_flown_by_hand_flies_again_exactly_as_it_was_flown(start):
+    hand = start("box-figure-eight")
+    for command in (
+        lambda s: s.turn("reference.yaw", -30.0),
+        lambda s: s.steer((0.3, 0.0, 0.0)),
+        lambda s: s.turn("reference.pitch", 5.0),
+        lambda s: s.target((0.2, 0.1, 1.1)),
+    ):
+        hand.do(command, seconds=0.7)
+    saved = hand.session.recording()
+    again = Flight(load_mission(saved.mission.resolved())).run()
+    for name in ("load", "load_attitude", "reference_attitude", "tensions"):
+        np.testing.assert_array_equal(again[name], saved[name], err_msg=name)
 
 
 COMMANDS = (

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from colift.kernel.jit import aside, inline
 
 
@@ -50,6 +52,34 @@ def turn_to(roll, pitch, yaw, attitude, rates):  # type: ignore[no-untyped-def]
         rates[m, 0] = d_roll[m] - sunk[m]
         rates[m, 1] = q1[m] + q2[m]
         rates[m, 2] = r1[m] - r2[m]
+
+
+def angles_of(attitude, rates):  # type: ignore[no-untyped-def]
+    """Roll, pitch and yaw with three derivatives (4, 3), rad, of which :func:`turn_to` makes an attitude and its rates; plain Python.
+
+    Near a pitch of 90 degrees, where there are no such angles, their derivatives are bounded.
+    """
+    w, x, y, z = attitude
+    found = np.zeros((4, 3))
+    found[0] = (
+        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0)),
+        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+    p, q, r = (tuple(rates[:, k].tolist()) for k in range(3))
+    for k in range(3):  # each round knows one derivative more
+        roll, pitch = (tuple(found[:, j].tolist()) for j in range(2))
+        (sine_r, cosine_r), (sine_p, (c, c1, c2)) = _waves(roll), _waves(pitch)
+        c = max(c, 0.05)
+        secant = (1.0 / c, -c1 / c**2, (2.0 * c1 * c1 / c - c2) / c**2)
+        across = tuple(a + b for a, b in zip(_times(q, sine_r), _times(r, cosine_r), strict=True))
+        turning = _times(across, secant)
+        found[k + 1] = (
+            p[k] + _times(turning, sine_p)[k],
+            _times(q, cosine_r)[k] - _times(r, sine_r)[k],
+            turning[k],
+        )
+    return found
 
 
 @inline

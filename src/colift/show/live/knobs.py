@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.control.reference.base import ReferencePart
+from colift.control.reference.guided import Guided
 from colift.flight.flight import Flight
+from colift.kernel.math.turning import angles_of
 from colift.part import Part, answering, find
 from colift.team import Team
 from colift.world.disturbance.base import DisturbancePart
@@ -33,6 +40,12 @@ _ALLOCATION = (
     Knob("allocation.min_angle_deg", "Least angle of cables", "deg", 5.0, 60.0),
     Knob("allocation.max_cone_deg", "Widest cone", "deg", 20.0, 85.0),
 )
+POSE = (
+    Knob("reference.roll", "Roll of the load", "deg", -20.0, 20.0),
+    Knob("reference.pitch", "Pitch of the load", "deg", -20.0, 20.0),
+    Knob("reference.yaw", "Yaw of the load", "deg", -180.0, 180.0),
+)
+"""What turns a rigid load: its wanted angles."""
 _GAINS = {"k_p": "proportional", "k_d": "derivative", "k_i": "integral"}
 _CONTROL = {"load_control": "Load", "position_control": "Drones"}
 _UNITS = {"k_p": "N/m", "k_d": "N s/m", "k_i": "N/(m s)"}
@@ -42,6 +55,7 @@ def knobs_of(flight: Flight) -> dict[str, Knob]:
     """By name, the knobs of what flies; the mission's values give the ranges of mass and gains."""
     mass = flight.mission.load.mass
     found = [Knob("load.mass", "True mass of the load", "kg", 0.2 * mass, 3.0 * mass)]
+    found += POSE if flight.mission.team.body is not None else ()
     parts = flight.parts
     found += [
         knob for knob in _ALLOCATION if knob.name.partition(".")[2] in fields(parts["allocation"])
@@ -65,8 +79,27 @@ def read(flight: Flight, name: str) -> float:
     """Where a knob stands, read back from what flies."""
     if name == "load.mass":
         return flight.load_mass
+    for k, knob in enumerate(POSE):
+        if name == knob.name:
+            return wanted_angles_deg(flight)[k]
     section, _, field = name.rpartition(".")
     return largest(getattr(flight.parts[section], field))
+
+
+def angles(flight: Flight) -> NDArray[np.float64]:
+    """Roll, pitch and yaw that the reference has now, with three derivatives (4, 3), rad."""
+    reference = flight.parts["reference"]
+    assert isinstance(reference, ReferencePart)
+    _, attitude, rates = reference.pose(flight.mission.team, flight.clock)
+    return np.asarray(angles_of(attitude, rates))
+
+
+def wanted_angles_deg(flight: Flight) -> tuple[float, float, float]:
+    """Roll, pitch and yaw that a rigid load goes to, where it is flown by hand, or has now, degrees; yaw from -180 to 180."""
+    reference = flight.parts["reference"]
+    now = np.degrees(angles(flight)[0]).tolist()
+    roll, pitch, yaw = reference.attitude_deg if isinstance(reference, Guided) else now
+    return roll, pitch, math.remainder(yaw, 360.0)
 
 
 def setting(flight: Flight, name: str, value: float) -> Any:

@@ -6,6 +6,7 @@ commands and read :meth:`~Session.rows`, :meth:`~Session.events` and the attribu
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 from collections import deque
@@ -237,6 +238,9 @@ class Session:
             raise ColiftError(f"there is no knob {name}")
         if not knob.min <= value <= knob.max:
             raise ColiftError(f"{name} must be between {knob.min:g} and {knob.max:g}")
+        if knob in knobs.POSE:
+            self._pose(knob, value)
+            return
         setting = knobs.setting(self.flight, name, value)
         for _, message in knobs.conflicts(self.flight, name, setting):
             raise ColiftError(message)
@@ -389,8 +393,33 @@ class Session:
         return np.asarray(part.sample(np.array([self.flight.clock]), self.mission.team)[0])
 
     def _guided(self) -> Guided:
+        """What flies by hand; where nothing does yet, a rigid load becomes upright and keeps its heading."""
         part = self.flight.parts["reference"]
-        return part if isinstance(part, Guided) else Guided()
+        if isinstance(part, Guided) or self.mission.team.body is None:
+            return part if isinstance(part, Guided) else Guided()
+        angles = knobs.angles(self.flight)
+        return Guided().turned((0.0, 0.0, math.degrees(angles[0, 2])), self.flight.clock, angles)
+
+    def _pose(self, knob: knobs.Knob, value: float) -> None:
+        """Turn a rigid load about one axis, yaw the shorter way; if it follows the mission's reference, it stops."""
+        if value and knob.name != "reference.yaw" and self.flight.membership.outlook.upright:
+            raise ColiftError("without the drone that is lost, roll and pitch are not flown")
+        guided, angles = self._guided(), knobs.angles(self.flight)
+        if guided is not self.flight.parts["reference"]:
+            guided = guided.along((0.0, 0.0, 0.0), self.flight.clock, self._reference())
+        roll, pitch, yaw = guided.attitude_deg
+        if knob.name == "reference.roll":
+            roll = value
+        elif knob.name == "reference.pitch":
+            pitch = value
+        else:
+            yaw = value
+        now = math.degrees(angles[0, 2])
+        wanted = (roll, pitch, now + math.remainder(yaw - now, 360.0))
+        self._guide(
+            guided.turned(wanted, self.flight.clock, angles),
+            f"{knob.label} {value:.4g} {knob.unit}",
+        )
 
     def _guide(self, part: Guided, text: str) -> None:
         if self.flight.membership.descent:
