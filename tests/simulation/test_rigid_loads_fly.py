@@ -253,6 +253,9 @@ def test_a_box_that_loses_a_corner_goes_on_leaning_so_that_the_corner_sinks() ->
     found = metrics.compute(recording)
     assert found["tracking_max_m"] < 0.1
     assert found["attitude_max_deg"] < 10.0
+    told = [(moment.time, moment.text) for moment in recording.moments if moment.kind == "change"]
+    assert told == [(1.0, f"The load {flight.membership.outlook}")]
+    assert "leaning by 10 degrees" in told[0][1]
 
 
 def test_a_team_that_is_put_together_anew_in_full_motion_flies_on_as_if_nothing_were() -> None:

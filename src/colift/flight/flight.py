@@ -360,7 +360,10 @@ class Flight:
             cycle_time=np.arange(first_cycle, first_cycle + len(allocations), dtype=np.float64)
             * (every.allocation * every.step),
             arrays=arrays,
-            provenance={"warnings": self.warnings} if self.warnings else {},
+            provenance={
+                **({"warnings": self.warnings} if self.warnings else {}),
+                **({"outlooks": list(self.membership.said)} if self.membership.said else {}),
+            },
             outcome=(self.membership.descent or self.outcome)
             if self.outcome == "completed"
             else self.outcome,

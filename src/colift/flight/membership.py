@@ -35,6 +35,8 @@ class Membership:
         How the load hangs on those that fly, and at what pace the reference goes on.
     formation : array, optional
         Of a rigid load: cables' forces (n, 3) from which those that fly now went on; see :func:`colift.team.plan.shares`.
+    said : tuple of (time, text)
+        How a rigid load went on each time that the team changed, s.
 
     """
 
@@ -43,6 +45,7 @@ class Membership:
     descent: str = ""
     outlook: Outlook = field(default_factory=Outlook)
     formation: Array | None = None
+    said: tuple[tuple[float, str], ...] = ()
 
     def judged_lost(self, drones: list[int], carrying: Any, time: float) -> list[int]:
         """Those of ``drones`` whose ``carrying`` (n,) is 0 now; they are noted in :attr:`found`."""
@@ -80,6 +83,7 @@ class Membership:
         if found.carries:
             self.outlook, reference = found, parts["reference"]
             assert isinstance(reference, ReferencePart)
+            self.said += ((time, str(found)),) if team.body is not None else ()
             return {"reference": reference.upright()} if found.upright else {}
         if not {*before} - {*drones}:  # who has joined is no reason to come down
             return {}

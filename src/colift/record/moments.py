@@ -441,12 +441,18 @@ def _commanded(recording: Recording) -> set[int]:
 
 
 def _changes(recording: Recording, after: float) -> Iterator[Moment]:
-    """What the mission asked for, later than a time; drones that come and go are seen in the signals."""
+    """What changed the team's task later than a time: what the mission asked for, and how a rigid load goes on with other drones.
+
+    Drones that come and go are seen in the signals.
+    """
     commanded = _commanded(recording)
     for k, event in enumerate(recording.mission.events):
         asked = k not in commanded and not event.of_team
         if asked and after < event.at <= recording.time[-1]:
             yield Moment(event.at, "change", _asked(event))
+    for time, text in recording.provenance.get("outlooks", []):
+        if time > after:
+            yield Moment(float(time), "change", f"The load {text}")
 
 
 def _asked(event: Event) -> str:

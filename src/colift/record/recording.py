@@ -103,7 +103,8 @@ class Recording(Mapping[str, Array]):
     outcome : str
         ``"completed"``, or how the flight ended.
     provenance : dict
-        Where the data of a real flight come from, and what was inferred; empty for a simulation.
+        Where the data of a real flight come from, and what was inferred; of a simulation its ``warnings``, and as ``outlooks`` how a rigid
+        load went on when the team had changed, each a time, s, and words.
     commands : list of (time, text)
         What a person did while it flew, s.
     foreign : dict

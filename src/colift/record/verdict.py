@@ -269,12 +269,18 @@ def _seen(recording: Recording, values: Mapping[str, float]) -> list[str]:
 
 
 def _summary(values: Mapping[str, float]) -> str:
-    words = []
+    words, turned = [], values.get("attitude_max_deg", math.nan)
     error = values.get("tracking_max_m", math.nan)
     if math.isfinite(error):
         distance = f"{error:.2g} m" if error >= 1.0 else f"{100.0 * error:.2g} cm"
-        words.append(f"load within {distance} of its reference")
-    angle = values.get("min_angle_deg", math.nan)
-    if math.isfinite(angle):
-        words.append(f"smallest angle {angle:.1f} deg")
+        angle = f" and {turned:.2g} deg" if math.isfinite(turned) else ""
+        words.append(f"load within {distance}{angle} of its reference")
+    least, apart = (
+        values.get("min_angle_deg", math.nan),
+        values.get("min_drone_distance_m", math.nan),
+    )
+    if math.isfinite(turned) and math.isfinite(apart):  # cables that end apart may be parallel
+        words.append(f"drones {apart:.2f} m apart at least")
+    elif math.isfinite(least):
+        words.append(f"smallest angle {least:.1f} deg")
     return "; ".join(words)
