@@ -1,9 +1,15 @@
-"""Draws the pictures of the viewer in this folder: python docs/images/viewer.py (needs the extra render)."""
+"""Draws the pictures and the film of the viewer in this folder: python docs/images/viewer.py (needs the extra render)."""
 
 from __future__ import annotations
 
+import io
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from playwright.sync_api import Page
 
 import colift
 from colift.show.viewer.browser import browser
@@ -21,6 +27,22 @@ PICTURES = {
     ),
 }
 
+BOX = colift.run("box-figure-eight")
+
+
+def film(
+    page: Page, path: Path, times: Iterable[float], size: tuple[int, int], colours: int
+) -> None:
+    """A small film of an open page without the names of drones, as large as the page gets smaller."""
+    page.keyboard.press("l")
+    frames = []
+    for time in times:
+        page.evaluate("time => colift.seek(time)", time)
+        frame = Image.open(io.BytesIO(page.screenshot())).convert("RGB").resize(size)
+        frames.append(frame.quantize(colours, dither=0))
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=100, loop=0)
+
+
 with tempfile.TemporaryDirectory() as folder, browser() as started:
     for name, (theme, time, runs) in PICTURES.items():
         data = payload(
@@ -33,3 +55,9 @@ with tempfile.TemporaryDirectory() as folder, browser() as started:
         page.locator(DRAWN).wait_for()
         page.evaluate("time => colift.seek(time)", time)
         page.screenshot(path=HERE / f"{name}.png")
+    data = payload([BOX.recording], [BOX.metrics], [""])
+    page = started.new_page(viewport={"width": 960, "height": 540})
+    page.goto(write_page(Path(folder) / "box.html", data, theme="light", bare=True).as_uri())
+    page.locator(DRAWN).wait_for()
+    once = np.arange(9.2, 14.6, 0.1)  # one eight
+    film(page, HERE / "box-figure-eight.gif", once.tolist(), (560, 315), 160)

@@ -46,6 +46,8 @@ export interface FlightInfo {
   ground: number | null;
   /** Least angle that was asked for, if any was. */
   safe_angle_deg: number | null;
+  /** Least distance of two drones that was asked for, if any was, m. */
+  safe_distance: number | null;
   /** Weight of the load and mean thrust of a drone, N: they set the length of arrows. */
   weight: number;
   thrust: number;
@@ -117,7 +119,7 @@ export const WIDTHS = {
 
 export type Signal = keyof typeof WIDTHS;
 /** Signals that the page computes from a row. */
-export type Derived = "error" | "angle" | "spin";
+export type Derived = "error" | "turned" | "angle" | "apart" | "spin";
 
 export const SIGNALS = Object.keys(WIDTHS) as Signal[];
 export type Row = Record<Signal, ArrayLike<number>>;
@@ -142,7 +144,7 @@ export class Flight {
 
   constructor(readonly info: FlightInfo) {
     this.full = (2 * info.weight) / info.n || 1;
-    const columns = { error: new Column(1), angle: new Column(1), spin: new Column(info.n) } as Flight["columns"];
+    const columns = { error: new Column(1), turned: new Column(1), angle: new Column(1), apart: new Column(1), spin: new Column(info.n) } as Flight["columns"];
     for (const name of SIGNALS) columns[name] = new Column(WIDTHS[name](info.n));
     this.columns = columns;
   }
@@ -182,7 +184,9 @@ export class Flight {
     for (const name of SIGNALS) columns[name].push(values[name]);
     const { load, reference, directions, thrusts } = values;
     columns.error.push([Math.hypot(load[0]! - reference[0]!, load[1]! - reference[1]!, load[2]! - reference[2]!)]);
+    columns.turned.push([this.info.body ? turnOf(values.load_attitude, values.reference_attitude) : NaN]);
     columns.angle.push([n > MOST_PAIRED ? NaN : closest(directions, n).angle]);
+    columns.apart.push([n > MOST_PAIRED ? NaN : nearest(values.positions, n).distance]);
     const spin = new Float32Array(n);
     for (let i = 0; i < n; i++) {
       const before = this.rows ? columns.spin.at(this.rows - 1, i) : i;
@@ -277,6 +281,34 @@ function turn(out: Float32Array, column: Column, row: number, next: number, part
     }
     for (let k = i; k < i + 4; k++) out[k]! /= Math.sqrt(norm) || 1;
   }
+}
+
+/** Angle of the turn from one attitude to another, deg. */
+export function turnOf(q: ArrayLike<number>, p: ArrayLike<number>): number {
+  const [w, x, y, z] = q as unknown as [number, number, number, number];
+  const [a, b, c, d] = p as unknown as [number, number, number, number];
+  // Imaginary part of q p*: exact for small angles, where the real part says nothing.
+  const across = Math.hypot(x * a - w * b - y * d + z * c, y * a - w * c - z * b + x * d, z * a - w * d - x * c + y * b);
+  return (2 * Math.atan2(across, Math.abs(w * a + x * b + y * c + z * d)) * 180) / Math.PI;
+}
+
+export interface Gap {
+  one: number;
+  other: number;
+  distance: number;
+}
+
+/** The two drones that are nearest to each other, m; NaN when there are no two. */
+export function nearest(positions: ArrayLike<number>, n: number): Gap {
+  const found: Gap = { one: -1, other: -1, distance: NaN };
+  for (let i = 0; i < n; i++) {
+    for (let j = i + 1; j < n; j++) {
+      const distance = Math.hypot(...[0, 1, 2].map((k) => positions[3 * i + k]! - positions[3 * j + k]!));
+      if (distance < found.distance || (Number.isNaN(found.distance) && !Number.isNaN(distance)))
+        Object.assign(found, { one: i, other: j, distance });
+    }
+  }
+  return found;
 }
 
 export interface Pair {

@@ -174,7 +174,10 @@ export class Cockpit {
       return made;
     };
     const views = VIEWS.map((view) => chip(view, view[0]!.toUpperCase() + view.slice(1), () => this.look(view), view === this.view));
-    const switches = SWITCHES.map(([name, title]) => chip(name, title, () => this.flip(name), this.shown[name]));
+    const rigid = this.flights.some((flight) => flight.info.body);
+    const switches = SWITCHES.map(([name, title]) =>
+      chip(name, rigid && name === "angles" ? "Distances" : title, () => this.flip(name), this.shown[name]),
+    );
     return el(
       "div",
       { class: "toolbar" },
@@ -184,12 +187,16 @@ export class Cockpit {
   }
 
   private scene(stage: Stage, flight: Flight): HTMLElement {
-    const cells = ["error", "smallest angle", "total tension", "allocator"].map((name) => ({ name, out: el("b") }));
-    const [error, angle, total, status] = cells.map((cell) => cell.out);
+    const rigid = flight.info.body !== null;
+    const closest = rigid ? "closest drones" : "smallest angle";
+    const cells = ["error", closest, "total tension", "allocator"].map((name) => ({ name, out: el("b") }));
+    const [error, near, total, status] = cells.map((cell) => cell.out);
     this.hud.push((frame) => {
-      error!.textContent = `${format(100 * frame.error[0]!)} cm`;
-      angle!.textContent = `${format(frame.angle[0]!, 1)}\u00b0`;
-      angle!.classList.toggle("low", frame.angle[0]! < (flight.info.safe_angle_deg ?? 0));
+      const [turned, angle, apart] = [frame.turned[0]!, frame.angle[0]!, frame.apart[0]!];
+      error!.textContent = `${format(100 * frame.error[0]!)} cm${rigid ? `, ${format(turned)}\u00b0` : ""}`;
+      near!.textContent = rigid ? `${format(apart)} m` : `${format(angle, 1)}\u00b0`;
+      const least = (rigid ? flight.info.safe_distance : flight.info.safe_angle_deg) ?? 0;
+      near!.classList.toggle("low", (rigid ? apart : angle) < least);
       const sum = frame.tensions.reduce((so, tension) => so + (Number.isFinite(tension) ? tension : 0), 0);
       total!.textContent = frame.tensions.some(Number.isFinite) ? `${sum.toFixed(2)} N` : "\u2013";
       status!.textContent = STATUS[frame.status[0]!] ?? "\u2013";

@@ -28,6 +28,8 @@ interface Plot {
   summaryTitle: string;
   /** Vertical axis in powers of ten. */
   log?: boolean;
+  /** Only of rigid loads, or only of points. */
+  body?: boolean;
   /** A level not to fall below, drawn across. */
   limit?: (flight: Flight) => number | undefined;
 }
@@ -56,9 +58,9 @@ const wanted = (flight: Flight): Line[] =>
     quiet: true,
   }));
 
-const pairs = (flight: Flight): Line[] => {
+/** A thin line for every two drones, of what `between` says of them. */
+const everyTwo = (flight: Flight, between: (row: number, i: number, j: number) => number): Line[] => {
   if (flight.n > MANY_PAIRED) return [];
-  const { data } = flight.columns.directions;
   const lines: Line[] = [];
   for (let i = 0; i < flight.n; i++)
     for (let j = i + 1; j < flight.n; j++)
@@ -67,10 +69,21 @@ const pairs = (flight: Flight): Line[] => {
         colour: theme.palette.unknown,
         dash: [],
         width: 0.8,
-        values: (row) => angleBetween(data.subarray(3 * flight.n * row, 3 * flight.n * (row + 1)), i, j),
+        values: (row) => between(row, i, j),
         quiet: true,
       });
   return lines;
+};
+
+const pairs = (flight: Flight): Line[] => {
+  const { data } = flight.columns.directions;
+  return everyTwo(flight, (row, i, j) => angleBetween(data.subarray(3 * flight.n * row, 3 * flight.n * (row + 1)), i, j));
+};
+
+const gaps = (flight: Flight): Line[] => {
+  const { positions } = flight.columns;
+  const along = (row: number, i: number, j: number, k: number): number => positions.at(row, 3 * i + k) - positions.at(row, 3 * j + k);
+  return everyTwo(flight, (row, i, j) => Math.hypot(along(row, i, j, 0), along(row, i, j, 1), along(row, i, j, 2)));
 };
 
 const over = (flight: Flight, pick: (...values: number[]) => number) => (row: number) => {
@@ -113,6 +126,17 @@ export const PLOTS: Plot[] = [
     summary: (flight) => (row) => flight.columns.angle.at(row),
     summaryTitle: "Smallest angle between cables",
     limit: (flight) => flight.info.safe_angle_deg ?? undefined,
+    body: false,
+  },
+  {
+    title: "Distance between drones",
+    unit: "m",
+    digits: 2,
+    lines: (flight) => [single("smallest", (row) => flight.columns.apart.at(row)), ...gaps(flight)],
+    summary: (flight) => (row) => flight.columns.apart.at(row),
+    summaryTitle: "Smallest distance between drones",
+    limit: (flight) => flight.info.safe_distance ?? undefined,
+    body: true,
   },
   {
     title: "Distance from reference",
@@ -124,6 +148,15 @@ export const PLOTS: Plot[] = [
     ],
     summary: (flight) => (row) => 100 * flight.columns.error.at(row),
     summaryTitle: "Distance from reference",
+  },
+  {
+    title: "Angle from wanted attitude",
+    unit: "\u00b0",
+    digits: 2,
+    lines: (flight) => [single("angle", (row) => flight.columns.turned.at(row))],
+    summary: (flight) => (row) => flight.columns.turned.at(row),
+    summaryTitle: "Angle from wanted attitude",
+    body: true,
   },
   {
     title: "Solve time",
@@ -329,7 +362,9 @@ class Chart {
 
 /** All plots; `window` is the length of the past that live plots show, s. */
 export function plots(flights: Flight[], clock: Clock, window = Infinity): Part {
-  const charts = PLOTS.map((plot) => new Chart(plot, flights, clock, window));
+  const rigid = flights.some((flight) => flight.info.body);
+  const shown = PLOTS.filter(({ body }) => body === undefined || body === rigid);
+  const charts = shown.map((plot) => new Chart(plot, flights, clock, window));
   const element = el("div", { class: "plots" }, ...charts.map((chart) => chart.element));
   return { element, update: () => charts.forEach((chart) => chart.update()) };
 }

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import { angleBetween, closest, Column, Flight, SIGNALS, WIDTHS } from "../src/data";
+import { angleBetween, closest, Column, Flight, nearest, SIGNALS, turnOf, WIDTHS } from "../src/data";
 import { MOST_PAIRED } from "../src/tables";
 import { carried, flight, near } from "./flights";
 
@@ -97,4 +97,33 @@ test("the closest pair is found among cables of which one is unknown", () => {
 test("pairs of very many drones are not looked at", () => {
   assert(Number.isFinite(flight(MOST_PAIRED, [[0, {}]]).columns.angle.at(0)));
   assert(Number.isNaN(flight(MOST_PAIRED + 1, [[0, {}]]).columns.angle.at(0)));
+});
+
+test("the turn from one attitude to another has its angle, whatever the signs and however small", () => {
+  const about = (angle: number, x: number, y: number, z: number) => [Math.cos(angle / 2), ...[x, y, z].map((part) => part * Math.sin(angle / 2))];
+  const tilted = about(0.5, 0.6, 0, 0.8);
+  for (const angle of [1e-6, 0.3, 2.9]) {
+    // The second one turned by the angle about the vertical.
+    const [c, , , s] = about(angle, 0, 0, 1) as [number, number, number, number];
+    const [w, x, y, z] = tilted as [number, number, number, number];
+    const further = [c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w];
+    assert(near([turnOf(further, tilted)], [(angle * 180) / Math.PI], 1e-9 + 1e-9 * angle));
+    assert(near([turnOf(further.map((part) => -part), tilted)], [(angle * 180) / Math.PI], 1e-9 + 1e-9 * angle));
+  }
+});
+
+test("the nearest two drones are found, without those that are gone", () => {
+  const positions = [0, 0, 0, 3, 0, 4, 0, 1, 0, NaN, NaN, NaN];
+  assert.deepEqual(nearest(positions, 4), { one: 0, other: 2, distance: 1 });
+  assert(Number.isNaN(nearest(positions, 1).distance));
+});
+
+test("only a rigid load has an error of its attitude, only two drones have a distance", () => {
+  const turned = [Math.SQRT1_2, 0, 0, Math.SQRT1_2];
+  const given = { load_attitude: turned, reference_attitude: [1, 0, 0, 0], positions: [0, 0, 0, 0.5, 0, 0] };
+  const body = { size: [1, 1, 1], attachments: [[0, 0, 0], [0, 0, 0]] };
+  const box = flight(2, [[0, given]], { body });
+  assert(near([box.columns.turned.at(0), box.columns.apart.at(0)], [90, 0.5], 1e-4));
+  assert(Number.isNaN(flight(2, [[0, given]]).columns.turned.at(0)));
+  assert(Number.isNaN(flight(1, [[0, {}]], { body }).columns.apart.at(0)));
 });

@@ -15,6 +15,7 @@ export function info(n: number, changes: Partial<FlightInfo> = {}): FlightInfo {
     body: null,
     radii: Array<null>(n).fill(null),
     safe_angle_deg: null,
+    safe_distance: null,
     ground: 0,
     weight: 2,
     thrust: 5,

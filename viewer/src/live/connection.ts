@@ -34,6 +34,7 @@ export interface Hello {
   radii: (number | null)[];
   body: Body | null;
   safe_angle_deg: number | null;
+  safe_distance: number | null;
   /** Height of the ground, m, where there is one. */
   ground: number | null;
   knobs: Knob[];

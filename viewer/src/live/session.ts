@@ -170,6 +170,7 @@ function about(hello: Hello): FlightInfo {
     radii: hello.radii,
     body: hello.body,
     safe_angle_deg: hello.safe_angle_deg,
+    safe_distance: hello.safe_distance,
     ground: hello.ground,
     weight: mass * GRAVITY,
     thrust: 1,

@@ -1,4 +1,4 @@
-// The load, and where it should be: a point as a stone and a ring, a rigid load as a box and its edges.
+// The load, and where it should be: a point as a stone and a ring, a rigid load as a box and its edges, with a knob where a cable ends.
 
 import {
   BoxGeometry,
@@ -10,6 +10,7 @@ import {
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
+  SphereGeometry,
   TorusGeometry,
 } from "three";
 import type { Maker } from "./element";
@@ -26,11 +27,18 @@ export const load: Maker = (flight, { drone }) => {
   const wanted = rigid
     ? new LineSegments(new EdgesGeometry(new BoxGeometry(x, y, z)), new LineBasicMaterial())
     : new Mesh(new TorusGeometry(0.62 * drone, 0.035 * drone, 6, 40), new MeshBasicMaterial());
+  const hooks = new MeshBasicMaterial();
+  for (const place of rigid?.attachments ?? []) {
+    const hook = new Mesh(new SphereGeometry(0.11 * drone, 12, 8), hooks);
+    hook.position.fromArray(place);
+    body.add(hook);
+  }
   object.add(body, wanted);
   return {
     object,
     paint(palette) {
       body.material.color.set(palette.load);
+      hooks.color.set(palette.ink);
       wanted.material.color.set(palette.reference);
     },
     update(frame, shown) {

@@ -14,10 +14,11 @@ import { forces } from "./forces";
 import { ground } from "./ground";
 import { Overlay } from "./labels";
 import { load } from "./load";
+import { nearest } from "./nearest";
 import { paths } from "./paths";
 import { target } from "./target";
 
-const MAKERS: Maker[] = [ground, paths, load, cables, drones, forces, angles, downwash, target];
+const MAKERS: Maker[] = [ground, paths, load, cables, drones, forces, angles, nearest, downwash, target];
 
 export class Stage {
   readonly element = el("div", { class: "stage" });

@@ -46,6 +46,7 @@ def hello(session: Session, role: str) -> str:
             ],
             "body": body_of(mission),
             "safe_angle_deg": limits(mission).angle_deg,
+            "safe_distance": limits(mission).distance_m,
             "ground": None if mission.ground is None else mission.ground.height,
             "legend": _legend(),
             "knobs": [

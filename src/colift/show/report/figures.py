@@ -24,6 +24,8 @@ class Entry(NamedTuple, Generic[Source]):
     """Signals without which there is nothing to draw; of a comparison the kinds of loads."""
     without: tuple[str, ...] = ()
     """Signals with which another figure says more."""
+    rigid: bool = False
+    """Whether it is of a rigid load."""
 
 
 def drawable(recording: Recording) -> dict[str, Entry[Recording]]:
@@ -32,6 +34,7 @@ def drawable(recording: Recording) -> dict[str, Entry[Recording]]:
         name: entry
         for name, entry in FIGURES.items()
         if recording.measured(*entry.needs)
+        and (recording.mission.load.kind == "rigid" or not entry.rigid)
         and not (entry.without and recording.measured(*entry.without))
     }
 
@@ -43,6 +46,7 @@ def register(
     *,
     needs: tuple[str, ...] = (),
     without: tuple[str, ...] = (),
+    rigid: bool = False,
 ) -> Callable[[Callable[[Source], Figure]], Callable[[Source], Figure]]:
     """Enter the decorated function, which from then on draws in the common style."""
 
@@ -52,7 +56,7 @@ def register(
             with style.look():
                 return function(source)
 
-        table[function.__name__] = Entry(title, caption, draw, needs, without)
+        table[function.__name__] = Entry(title, caption, draw, needs, without, rigid)
         return draw
 
     return enter
@@ -65,8 +69,8 @@ FIGURES: dict[str, Entry[Recording]] = {}
 @register(
     FIGURES,
     "Path",
-    "Wide: where the load should go. Thin: where it went; the squares are the load and the "
-    "dots the drones at the times given, with their cables. All axes have the same scale.",
+    "Wide: where the load should go. Thin: where it went; the squares, or boxes, are the load and "
+    "the dots the drones at the times given, with their cables. All axes have the same scale.",
     needs=("load",),
 )
 def path(recording: Recording) -> Figure:
@@ -86,6 +90,18 @@ def path(recording: Recording) -> Figure:
 )
 def position_error(recording: Recording) -> Figure:
     return _over_time(recording, panels.position_error)
+
+
+@register(
+    FIGURES,
+    "Attitude error",
+    "The rotation from the load's wanted attitude to its own, by component about the world's axes: z is yaw. The pale band is plus "
+    "and minus its angle.",
+    needs=("load_attitude", "reference_attitude"),
+    rigid=True,
+)
+def attitude_error(recording: Recording) -> Figure:
+    return _over_time(recording, panels.attitude_error)
 
 
 @register(
@@ -122,6 +138,18 @@ def wanted_tensions(recording: Recording) -> Figure:
 )
 def angles(recording: Recording) -> Figure:
     return _over_time(recording, panels.angles)
+
+
+@register(
+    FIGURES,
+    "Distances between drones",
+    "From centre to centre, of every two drones; more than ten pairs as what each drone has to the one nearest to it. Cables that end apart on a rigid load may be parallel: "
+    "this, not their angle, keeps the drones apart. The dashed line is the least distance that the mission asks for, if it does.",
+    needs=("positions",),
+    rigid=True,
+)
+def distances(recording: Recording) -> Figure:
+    return _over_time(recording, panels.distances)
 
 
 @register(

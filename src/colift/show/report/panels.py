@@ -14,6 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from colift.record.ends import cable_ends, turned_ends
+from colift.record.metrics import attitude_error as rotation_error
 from colift.record.metrics import thrust_limits, tilts, tracking_error
 from colift.record.moments import FOLLOWING, KINDS, Moment
 from colift.record.recording import Recording
@@ -188,6 +190,39 @@ def position_error(axes: Axes, recording: Recording) -> Array:
     for name, colour, values in zip("xyz", style.COMPONENTS, error.T, strict=True):
         line(axes, flight.time, values, color=colour, label=name)
     axes.set_ylabel("position error (cm)")
+    return FREE
+
+
+def attitude_error(axes: Axes, recording: Recording) -> Array:
+    """Rotation from a rigid load's wanted attitude to its own, degrees, about the world's axes, within plus and minus its angle."""
+    flight = intact(recording)
+    error = np.degrees(rotation_error(flight))
+    angle = np.linalg.norm(error, axis=1)
+    band(axes, flight.time, -angle, angle, color=style.PALE, label="± angle")
+    for name, colour, values in zip("xyz", style.COMPONENTS, error.T, strict=True):
+        line(axes, flight.time, values, color=colour, label=f"about {name}")
+    axes.set_ylabel("attitude error (deg)")
+    return FREE
+
+
+def distances(axes: Axes, recording: Recording) -> Array:
+    """Distances between drones, m: each pair, or of many the nearest one of each drone; the least that is asked for dashed."""
+    flight, n = intact(recording), recording.n
+    places = flight["positions"]
+    if n * (n - 1) // 2 <= style.MANY:
+        for i, j in zip(*np.triu_indices(n, k=1), strict=True):
+            apart = np.linalg.norm(places[:, i] - places[:, j], axis=1)
+            line(axes, flight.time, apart, label=f"{i}-{j}", **pair(int(i), int(j)))
+    else:
+        nearest = np.full(places.shape[:2], np.nan)
+        for i in range(n):  # one drone at a time: memory grows with n only
+            apart = np.linalg.norm(np.delete(places, i, axis=1) - places[:, i : i + 1], axis=2)
+            nearest[:, i] = np.min(apart, axis=1, initial=np.inf, where=~np.isnan(apart))
+        per_drone(axes, flight.time, np.where(np.isinf(nearest), np.nan, nearest))
+    least = limits(recording.mission).distance_m
+    if least is not None:
+        least_or_most(axes, least, f"{least:g} m limit")
+    axes.set_ylabel("distance of drones (m)")
     return FREE
 
 
@@ -384,9 +419,12 @@ def path(axes: Any, recording: Recording) -> None:
     drones = flight["positions"][rows]
     cables = np.full((len(rows), recording.n, 3, 3), np.nan)
     cables[:, :, 0] = drones
-    cables[:, :, 1] = flown[rows][:, None]
+    cables[:, :, 1] = cable_ends(flight)[rows][:, :, 0]
     axes.plot(*cables.reshape(-1, 3).T, color="#777777", linewidth=0.8)
-    axes.plot(*flown[rows].T, "s", color=style.INK, markersize=4.5)
+    if team.body is None:
+        axes.plot(*flown[rows].T, "s", color=style.INK, markersize=4.5)
+    else:
+        axes.plot(*_boxes(flight, rows).T, color=style.INK, linewidth=1.0)
     few = recording.n <= style.MANY
     for i in range(min(recording.n, len(style.PALETTE))):
         axes.plot(
@@ -398,8 +436,9 @@ def path(axes: Any, recording: Recording) -> None:
             markersize=6.5 if few else 4.0,
             label=style.drone_label(i) if few else None,
         )
+    below = 0.0 if team.body is None else 0.6 * float(np.linalg.norm(team.body.size))
     for row in rows:
-        x, y, z = flown[row]
+        x, y, z = flown[row] - [0.0, 0.0, below]
         axes.text(
             x, y, z, f"\u00a0\u00a0 {flight.time[row]:.3g} s", fontsize=8, color="#444444", va="top"
         )
@@ -408,6 +447,19 @@ def path(axes: Any, recording: Recording) -> None:
     for name in "xyz":
         getattr(axes, f"set_{name}label")(f"{name} (m)", labelpad=0.0)
         axes.tick_params(axis=name, pad=0.0)
+
+
+def _boxes(flight: Recording, rows: list[int]) -> Array:
+    """Edges of a rigid load at these rows, one line (k, 3) with gaps."""
+    team = flight.mission.true_team
+    assert team.body is not None
+    corners = 0.5 * team.body.size * (2.0 * (np.arange(8)[:, None] >> np.arange(3) & 1) - 1.0)
+    load, attitude, rates = (flight[name][rows] for name in ("load", "load_attitude", "load_rates"))
+    places = turned_ends(load, attitude, rates, corners)[:, :, 0]
+    places = np.concatenate([places, np.full((len(rows), 1, 3), np.nan)], axis=1)
+    # Below, above, then what connects them; -1 is a gap.
+    along = [0, 1, 3, 2, 0, 4, 5, 7, 6, 4, -1, 1, 5, -1, 2, 6, -1, 3, 7, -1]
+    return places[:, along].reshape(-1, 3)
 
 
 def snapshots(flown: Array, apart: float, most: int = 4) -> list[int]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from colift.mission.criteria import METRICS
 from colift.mission.schema import Described
-from colift.record.metrics import compute, tracking_error
+from colift.record.metrics import attitude_error, compute, tracking_error
 from colift.record.moments import angle_pairs
 from colift.record.recording import Recording
 from colift.record.verdict import judge, limits
@@ -96,6 +96,7 @@ def _flight(
         "ground": None if mission.ground is None else mission.ground.height,
         "body": body_of(mission),
         "safe_angle_deg": limits(mission).angle_deg,
+        "safe_distance": limits(mission).distance_m,
         "weight": mission.load.mass * mission.world.gravity,
         "thrust": (mission.load.mass + mission.team.masses.sum())
         * mission.world.gravity
@@ -169,7 +170,7 @@ def _rows(
 
 
 def _extremes(recording: Recording) -> list[int]:
-    """Rows of the largest error, the largest and smallest tension, and the smallest angle."""
+    """Rows of the largest errors, the largest and smallest tension, the smallest angle, and of a rigid load the smallest distance."""
     directions = recording["directions"]
     curves = [
         -np.linalg.norm(tracking_error(recording), axis=1),
@@ -178,6 +179,11 @@ def _extremes(recording: Recording) -> list[int]:
     ]
     if angle_pairs(recording.n):
         curves.append(pairwise_angles(directions))
+    if recording.mission.load.kind == "rigid":
+        curves.append(-np.linalg.norm(attitude_error(recording), axis=1))
+        one, other = np.triu_indices(recording.n, k=1)
+        apart = recording["positions"][:, one] - recording["positions"][:, other]
+        curves += [np.linalg.norm(apart, axis=2)] * angle_pairs(recording.n)
     found = []
     for curve in curves:
         filled = np.where(np.isfinite(curve), curve, np.inf).reshape(len(curve), -1)
