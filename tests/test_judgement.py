@@ -160,6 +160,9 @@ def test_what_cannot_be_judged_is_refused(flight: Recording) -> None:
         judge(flight, ("safe",), {"safe": {"min_angle": 20.0}})
     with pytest.raises(ColiftError, match="safe"):
         judge(flight, ("safe",), {"safe": {"min_angle_deg": 140.0}})
+    rigid = colift.run("box-figure-eight", overrides={"timing.duration": 0.1}).recording
+    with pytest.raises(ColiftError, match=r"load\.kind.*only forces are judged"):
+        judge(rigid, ["safe-wrench"])
 
 
 def test_the_page_holds_every_flight_once(flight: Recording, tmp_path: Path) -> None:

@@ -219,6 +219,13 @@ def test_cells_tell_lost_missed_and_held_apart():
     ((title, _, lines),) = matrix_tables(rows)
     assert title == "safe, slack-cables"
     assert lines == [["wind", "2/5 (5-86 %)", "2", "20.0", "40", "0.50"]]
+    boxes = [
+        row("pass", attitude_max_deg=1.25),
+        row("fail", attitude_max_deg=7.0),
+        row("lost", attitude_max_deg=90.0),
+    ]
+    ((_, header, lines),) = matrix_tables(boxes)
+    assert (header[-1], lines[0][-1]) == ("attitude (deg)", "7.0")
     (nothing,) = matrix_tables(rows[3:])[0][2]
     assert nothing == ["wind", "0/2 (0-85 %)", "2", "-", "-", "-"]
 

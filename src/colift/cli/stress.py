@@ -166,6 +166,7 @@ def _judge(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
                     "allocator": allocator, "plant": plant, "passed": cell.passed, "lost": cell.lost,
                     "flights": cell.flown, "interval": interval(cell.passed, cell.flown),
                     "worst_m": cell.worst_m, "least_deg": cell.least_deg, "slack_s": cell.slack_s,
+                    "turned_deg": cell.turned_deg,
                 }
                 for (allocator, plant), cell in cells.items()
             ]

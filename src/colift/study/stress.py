@@ -184,6 +184,8 @@ class Cell:
     """Smallest angle between two cables in any of the others."""
     slack_s: float
     """Longest time without tension, summed over the cables, in any of the others."""
+    turned_deg: float = math.nan
+    """Largest angle of a rigid load from its wanted attitude in any of the others; NaN of a point."""
 
 
 def matrix(rows: Sequence[Row]) -> dict[str, dict[tuple[str, str], Cell]]:
@@ -202,8 +204,10 @@ def _cell(group: Sequence[Row]) -> Cell:
     ended = [row for row in group if fate(row) in ("held", "missed")]
 
     def most(name: str, sign: float = 1.0) -> float:
-        values = [sign * float(row[name]) for row in ended if not math.isnan(row[name])]
-        return sign * max(values, default=math.nan)
+        values = [
+            sign * float(row[name]) for row in ended if not math.isnan(row.get(name, math.nan))
+        ]
+        return sign * max(values) if values else math.nan
 
     return Cell(
         passed=sum(map(held, group)),
@@ -212,4 +216,5 @@ def _cell(group: Sequence[Row]) -> Cell:
         worst_m=most("tracking_max_m"),
         least_deg=most("min_angle_deg", -1.0),
         slack_s=most("slack_time_s"),
+        turned_deg=most("attitude_max_deg"),
     )

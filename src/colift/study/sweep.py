@@ -113,6 +113,14 @@ COLUMNS = {
     "slack_time_s": "slack",
 }
 """The metrics of tables and figure, and how they are called there; the file holds all."""
+RIGID = {
+    "tracking_rms_m": "tracking",
+    "attitude_max_deg": "attitude",
+    "min_drone_distance_m": "apart",
+    "mean_total_tension_N": "tension",
+    "slack_time_s": "slack",
+}
+"""Those of rigid loads, whose cables may be parallel."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +174,10 @@ def points(rows: Sequence[Mapping[str, Any]], overs: Sequence[Over]) -> list[Poi
     for values, flights in grouped.items():
         fates = Counter(map(judge.fate, flights))
         ended = [row for row in flights if judge.fate(row) in ("held", "missed")]
-        spread = {name: _spread([float(row[name]) for row in ended]) for name in COLUMNS}
+        spread = {
+            name: _spread([float(row.get(name, math.nan)) for row in ended])
+            for name in COLUMNS | RIGID
+        }
         wrong = Counter(
             str(row.get("error") or row.get("reasons") or row.get("outcome"))
             for row in flights

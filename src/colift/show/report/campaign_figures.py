@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from colift.show.report import style
 from colift.show.report.figures import Entry, register
 from colift.study.campaign import judge
 from colift.study.reproduction import THRESHOLD_DEG
-from colift.study.sweep import COLUMNS, Over, Point, points
+from colift.study.sweep import COLUMNS, RIGID, Over, Point, points
 
 Row = Mapping[str, Any]
 Rows = Sequence[Row]
@@ -208,7 +208,12 @@ class Swept:
 
     rows: Rows
     overs: Sequence[Over]
-    metrics: Mapping[str, str] = field(default_factory=lambda: COLUMNS)
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        """Names of the numbers that are shown, and how they are called."""
+        rigid = any(not math.isnan(point.spread["attitude_max_deg"][0]) for point in self.points)
+        return RIGID if rigid else COLUMNS
 
     @property
     def points(self) -> list[Point]:

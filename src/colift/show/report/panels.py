@@ -215,9 +215,9 @@ def distances(axes: Axes, recording: Recording) -> Array:
             line(axes, flight.time, apart, label=f"{i}-{j}", **pair(int(i), int(j)))
     else:
         nearest = np.full(places.shape[:2], np.nan)
-        for i in range(n):  # one drone at a time: memory grows with n only
-            apart = np.linalg.norm(np.delete(places, i, axis=1) - places[:, i : i + 1], axis=2)
-            nearest[:, i] = np.min(apart, axis=1, initial=np.inf, where=~np.isnan(apart))
+        for k in range(n):  # one drone at a time: memory grows with n only
+            apart = np.linalg.norm(np.delete(places, k, axis=1) - places[:, k : k + 1], axis=2)
+            nearest[:, k] = np.min(apart, axis=1, initial=np.inf, where=~np.isnan(apart))
         per_drone(axes, flight.time, np.where(np.isinf(nearest), np.nan, nearest))
     least = limits(recording.mission).distance_m
     if least is not None:

@@ -27,11 +27,15 @@ def matrix_tables(rows: Sequence[Row]) -> list[Table]:
     """One table an allocator and plant, a line a condition; before them, if there are several, one of shares."""
     cells = matrix(rows)
     places = list(dict.fromkeys(place for row in cells.values() for place in row))
+    rigid = any(not math.isnan(cell.turned_deg) for row in cells.values() for cell in row.values())
     tables = [
         (
             ", ".join(place),
-            COLUMNS,
-            [[condition, *cell_texts(row[place])] for condition, row in cells.items()],
+            [*COLUMNS, TURNED] if rigid else COLUMNS,
+            [
+                [condition, *cell_texts(row[place])][: None if rigid else -1]
+                for condition, row in cells.items()
+            ],
         )
         for place in places
     ]
@@ -46,17 +50,20 @@ def matrix_tables(rows: Sequence[Row]) -> list[Table]:
 
 
 COLUMNS = ["condition", "passed (95 %)", "lost", "distance (cm)", "angle (deg)", "slack (s)"]
+TURNED = "attitude (deg)"
+"""Of rigid loads the last column."""
 SHARES = "passed, with its 95 % interval"
 
 
 def cell_texts(cell: Cell) -> list[str]:
-    """A cell for people, as in :data:`COLUMNS`."""
+    """A cell for people, as in :data:`COLUMNS`, and :data:`TURNED`."""
     return [
         shares.text(cell.passed, cell.flown),
         str(cell.lost),
         _number(100.0 * cell.worst_m, 1),
         _number(cell.least_deg, 0),
         _number(cell.slack_s, 2),
+        _number(cell.turned_deg, 1),
     ]
 
 
@@ -113,7 +120,8 @@ def write_stress(
         "<h2>Matrix</h2>",
         '<p class="soft">Flights that keep every criterion, with the exact 95 % interval of their share; flights that '
         "lose the load or the team; and of the others the largest distance of the load from its reference, the "
-        "smallest angle between two cables and the longest time of slack, summed over the cables, in any.</p>",
+        "smallest angle between two cables, the longest time of slack, summed over the cables, and a rigid load's largest angle "
+        "from its wanted attitude, in any.</p>",
         *(_matrix(*table) for table in tables),
         "<h2>Flights that fail</h2>",
         _failures(failing, missions, folder, replays),

@@ -162,7 +162,7 @@ def _rows(
     length = float(time[-1] - time[0])
     width = sum(values[0].size for values in signals.values()) + 4
     affordable = budget / (width * 4 * 4 / 3)
-    count = min(RATE * length, max(affordable, LEAST_RATE * length)) + 1
+    count = min(RATE * length, max(affordable - len(moments), LEAST_RATE * length)) + 1
     kept = [np.linspace(time[0], time[-1], max(2, int(count))), np.asarray(moments, dtype=float)]
     wanted = np.concatenate(kept)
     nearest = np.searchsorted((time[1:] + time[:-1]) / 2.0, wanted)

@@ -263,10 +263,14 @@ def judge(
     Raises
     ------
     ColiftError
-        If the recording lacks forces or directions, or a limit cannot be held with such a team.
+        If the load is rigid, if the recording lacks forces or directions, or a limit cannot be held with such a team.
 
     """
     name = recording.mission.name
+    if recording.mission.load.kind == "rigid":
+        raise ColiftError(
+            f"{name}: load.kind: carries a rigid load, whose cables share a moment, too, and end apart; only forces are judged here"
+        )
     known = np.isfinite(recording["directions"]).all(axis=(1, 2))
     if not known.all() and (recording.source == "simulation" or not known.any()):
         raise ColiftError(f"{name}: needs the directions of all cables throughout the flight")
