@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from colift.errors import ColiftError
 from colift.flight.flight import Flight
 from colift.mission.load import load_mission
+from colift.record import metrics
 from colift.record.recording import Recording
 from colift.show.live import session as module
 from colift.show.live.pilot import Pilot
@@ -360,6 +361,18 @@ def test_a_box_turns_to_the_pose_that_is_asked_for_without_a_jump(start):
         steps = np.diff(rates[:, k], axis=0)
         mean = 0.5 * (rates[1:, k + 1] + rates[:-1, k + 1])
         np.testing.assert_allclose(steps, 0.001 * mean, atol=2e-5)
+
+
+@pytest.mark.parametrize("when", [1.0, 6.8, 8.4, 10.0])
+def test_a_box_in_any_motion_is_taken_over_gently(start, when):
+    hand = start("box-figure-eight", timing__duration=100.0)
+    hand.fly(when)
+    hand.do(lambda s: s.turn("reference.yaw", 60.0), seconds=0.5)
+    hand.do(lambda s: s.turn("reference.roll", 12.0), seconds=8.0)
+    r = hand.session.flight.recording()
+    assert np.degrees(np.linalg.norm(metrics.attitude_error(r), axis=1)).max() < 2.0
+    assert np.linalg.norm(metrics.tracking_error(r), axis=1).max() < 0.03
+    assert r["slack_times"].max() == 0.0
 
 
 def test_yaw_goes_the_shorter_way_round(start):

@@ -162,6 +162,14 @@ def test_a_point_does_not_turn_and_a_load_can_be_kept_upright():
     )
 
 
+def test_nothing_is_shorter_than_it_may_be():
+    part = Guided(least_time=3.0).turned((0.0, 0.0, 1.0), 0.0, np.zeros((4, 3)))
+    part = part.towards((1.0, -2.0, 1.51), 0.0, STILL)
+    assert np.linalg.norm(at(part, 2.9)[0, 1]) > 0.0
+    assert np.linalg.norm(part.pose(BOX, 2.9)[2][0]) > 0.0
+    np.testing.assert_allclose(at(part, 3.1)[0, 1], 0.0, atol=1e-9)
+
+
 def test_angles_stay_bounded_where_there_are_none():
     straight_up = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
     assert np.isfinite(angles_of(straight_up, np.ones((3, 3)))).all()

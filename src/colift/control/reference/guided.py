@@ -20,8 +20,8 @@ Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]
 
 _ZERO = (0.0, 0.0, 0.0)
-_DURATIONS = np.geomspace(0.5, 600.0, 96)
-"""Lengths of the transition that are tried, s."""
+_LONGEST, _TRIED = 600.0, 96
+"""Longest transition, s, and how many lengths up to it are tried."""
 _SAMPLES = np.linspace(0.0, 1.0, 33)
 
 
@@ -109,6 +109,8 @@ class Guided(ReferencePart):
     """Highest speed of the transition, m/s, unless it begins or ends with more."""
     max_acceleration: Annotated[float, Field(gt=0.0, le=50.0)] = 2.0
     """Highest acceleration of the transition, m/s^2, unless it begins with more."""
+    least_time: Annotated[float, Field(ge=0.1, le=60.0)] = 0.5
+    """Shortest transition, s: a rigid load's cables follow the wanted motion as it is and are turned by a short one, however small it is."""
     turn_begin: Annotated[float, Field(ge=0.0)] = 0.0
     """When a rigid load begins to turn, s."""
     turn_start_deg: tuple[Triple, Triple, Triple, Triple] = (_ZERO, _ZERO, _ZERO, _ZERO)
@@ -144,13 +146,18 @@ class Guided(ReferencePart):
     def params(self, team: Team) -> Vector:
         ends = (self.velocity,) if self.target is None else (self.target, _ZERO)
         duration, place = _shortest(
-            self.start, (*ends, _ZERO, _ZERO), self.max_speed, self.max_acceleration
+            self.start,
+            (*ends, _ZERO, _ZERO),
+            self.max_speed,
+            self.max_acceleration,
+            self.least_time,
         )
         turning, turn = _shortest(
             np.radians(self.turn_start_deg),
             np.radians((self.attitude_deg, _ZERO, _ZERO, _ZERO)),
             math.radians(self.max_turn_deg),
             math.radians(self.max_turn_acceleration_deg),
+            self.least_time,
         )
         return PARAMS.pack(
             team.n,
@@ -160,31 +167,32 @@ class Guided(ReferencePart):
 
 
 def _shortest(
-    start: ArrayLike, ends: ArrayLike, speed: float, acceleration: float
+    start: ArrayLike, ends: ArrayLike, speed: float, acceleration: float, least: float
 ) -> tuple[float, NDArray[np.float64]]:
-    """Duration and coefficients (3, :data:`AXIS`) of the shortest transition within its limits.
+    """Duration and coefficients (3, :data:`AXIS`) of the shortest transition within its limits that is not shorter than ``least``, s.
 
     ``start`` has value and three derivatives (4, 3), ``ends`` the same, or without the value the derivatives (3, 3). Where nothing keeps
     the limits, the nearest to them.
     """
     start, ends = np.asarray(start), np.asarray(ends)
     # In time over duration, for every duration at once: (durations, coefficients, axes).
+    durations = np.geomspace(least, _LONGEST, _TRIED)
     order = np.concatenate([np.arange(4), np.arange(4 - len(ends), 4)])
-    scaled = np.concatenate([start, ends]) * _DURATIONS[:, None, None] ** order[:, None]
+    scaled = np.concatenate([start, ends]) * durations[:, None, None] ** order[:, None]
     polynomials = _solved(order) @ scaled
     degree = len(order) - 1
-    excess = np.zeros(len(_DURATIONS))
+    excess = np.zeros(len(durations))
     for derivative, most, given in (
         (1, speed, max(_size(start[1]), _size(ends[-3]))),
         (2, acceleration, _size(start[2])),
     ):
         along = _rows(_SAMPLES, derivative, degree) @ polynomials
-        peaks = np.linalg.norm(along, axis=2).max(axis=1) / _DURATIONS**derivative
+        peaks = np.linalg.norm(along, axis=2).max(axis=1) / durations**derivative
         excess = np.maximum(excess, peaks / max(most, 1.001 * given) - 1.0)
     best = int(np.argmax(excess <= 0.0)) if (excess <= 0.0).any() else int(np.argmin(excess))
     coefficients = np.zeros((3, AXIS))
     coefficients[:, : degree + 1] = polynomials[best].T
-    return float(_DURATIONS[best]), coefficients
+    return float(durations[best]), coefficients
 
 
 def _rows(s: Vector, derivative: int, degree: int) -> NDArray[np.float64]:

@@ -52,6 +52,8 @@ KEPT_BYTES = 3e8
 """Bytes of the full recording that are kept at most."""
 STEERING_ENDS = 0.5
 """Clock time after which a velocity that is not renewed becomes zero, s."""
+GENTLE = 3.0
+"""Shortest transition of a rigid load, s."""
 WATCH_PERIOD = 0.1
 """Simulated time between two looks for what is worth a mark, s."""
 LOOK_PERIOD = 0.1
@@ -398,7 +400,9 @@ class Session:
         if isinstance(part, Guided) or self.mission.team.body is None:
             return part if isinstance(part, Guided) else Guided()
         angles = knobs.angles(self.flight)
-        return Guided().turned((0.0, 0.0, math.degrees(angles[0, 2])), self.flight.clock, angles)
+        return Guided(least_time=GENTLE).turned(
+            (0.0, 0.0, math.degrees(angles[0, 2])), self.flight.clock, angles
+        )
 
     def _pose(self, knob: knobs.Knob, value: float) -> None:
         """Turn a rigid load about one axis, yaw the shorter way; if it follows the mission's reference, it stops."""
