@@ -13,8 +13,9 @@ from made_up_flights import LENGTH, SPREAD, WEIGHT, cables, flight_columns, writ
 
 from colift.errors import FlightDataError
 from colift.record import metrics
-from colift.record.importing import Assumed, import_flight, read
+from colift.record.importing import Assumed, Reading, import_flight, read
 from colift.record.recording import Recording
+from colift.team.geometry import matrix_of
 
 UNEVEN = np.cumsum(np.tile([0.01, 0.01, 0.05, 0.01], 60)) - 0.01
 """Times with gaps, as real logs have them, s."""
@@ -129,3 +130,38 @@ def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     file.write_bytes(b"t,load_x\n\xff\xfe")
     with pytest.raises(FlightDataError, match=r"flight\.csv"):
         import_flight([file])
+
+
+def test_the_attitude_of_a_rigid_load_is_kept(tmp_path: Path) -> None:
+    def turned(**told: str) -> tuple[np.ndarray, np.ndarray]:
+        columns = flight_columns(2, UNEVEN[:20])
+        for x in [name for name in columns if name.endswith("x") and "frame" in told]:
+            y, z = x[:-1] + "y", x[:-1] + "z"
+            columns[x], columns[y], columns[z] = columns[y], columns[x], -columns[z]
+        half = np.linspace(0.1, 0.4, 20)
+        attitude = np.column_stack(
+            [np.cos(half), 0.6 * np.sin(half), 0.0 * half, 0.8 * np.sin(half)]
+        )
+        columns |= {f"load_q{name}": attitude[:, k] for k, name in enumerate("wxyz")}
+        columns["load_qw"][7] = 9.0
+        file = write_csv(tmp_path / f"bar{len(told)}.csv", columns)
+        recording = import_flight([file], told=Reading(**told))
+        (finding,) = recording.provenance["findings"]
+        assert finding["of"] == "attitude of load"
+        found = recording["load_attitude"]
+        assert np.isnan(found[7]).all()
+        return np.delete(found, 7, axis=0), np.delete(attitude, 7, axis=0)
+
+    found, given = turned()
+    np.testing.assert_allclose(found, given, atol=1e-9)
+    found, given = turned(frame="ned")
+    north = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    for up, down in zip(found, given, strict=True):
+        np.testing.assert_allclose(
+            matrix_of(up), north @ matrix_of(down) @ np.diag([1.0, -1.0, -1.0]), atol=1e-9
+        )
+
+
+def test_a_log_without_it_knows_no_attitude_of_the_load(tmp_path: Path) -> None:
+    recording = import_flight([write_csv(tmp_path / "a.csv", flight_columns(2, UNEVEN[:20]))])
+    assert np.isnan(recording["load_attitude"]).all()

@@ -102,7 +102,10 @@ def merge(logs: Sequence[Log], names: Sequence[str]) -> tuple[Log, list[Offset]]
         for log, o in zip(logs, offsets, strict=True)
         for each in log.findings
     ]
-    merged = Log(time - time[0], first.load[rows], first.reference[rows], drones, findings)
+    attitude = None if first.load_attitude is None else first.load_attitude[rows]
+    merged = Log(
+        time - time[0], first.load[rows], first.reference[rows], drones, findings, attitude
+    )
     return merged, offsets
 
 

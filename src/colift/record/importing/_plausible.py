@@ -149,20 +149,20 @@ def clean(log: Log, names: list[str]) -> Log:
             )
     for _, position, velocity in bodies:
         velocity[np.isnan(position).any(axis=1)] = np.nan
-    for i, name in enumerate(names):
-        length = np.linalg.norm(attitudes[:, i], axis=1)
+    turned = None if log.load_attitude is None else log.load_attitude.copy()
+    of = [(name, attitudes[:, i]) for i, name in enumerate(names)]
+    for name, attitude in [*of, *([] if turned is None else [("load", turned)])]:
+        length = np.linalg.norm(attitude, axis=1)
         odd: Rows = np.asarray(np.abs(length - 1.0) > UNIT_QUATERNION)
-        _leave_out(
-            attitudes[:, i], odd, "no unit quaternion", f"attitude of {name}", log.time, findings
-        )
-        attitudes[:, i] /= np.where(odd, np.nan, length)[:, None]
+        _leave_out(attitude, odd, "no unit quaternion", f"attitude of {name}", log.time, findings)
+        attitude /= np.where(odd, np.nan, length)[:, None]
     drones = {
         **log.drones,
         "positions": positions,
         "velocities": velocities,
         "attitudes": attitudes,
     }
-    return replace(log, load=load, drones=drones, findings=findings)
+    return replace(log, load=load, drones=drones, findings=findings, load_attitude=turned)
 
 
 def _no_number(values: Array, why: str, name: str, time: Array, findings: list[Finding]) -> None:

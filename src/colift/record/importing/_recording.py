@@ -48,7 +48,7 @@ def import_flight(
     """One flight from its log, or from several logs that are aligned in time by the load's motion.
 
     Signals: ``load``, ``reference``, ``positions``, ``velocities`` and, where logged, ``attitudes``,
-    ``rates`` and ``drone_forces`` are the logs'. ``force`` is the mean of the drones' own copies.
+    ``rates``, ``drone_forces`` and ``load_attitude`` are the logs'. ``force`` is the mean of the drones' own copies.
     ``desired_tensions`` and ``desired_directions`` are size and opposite direction of the share that each
     drone's own allocator gave to its cable. ``directions`` point from drone to load, and
     ``direction_rates`` follow from the velocities. Everything else was not measured and is NaN, the
@@ -143,6 +143,8 @@ def _signals(log: Log) -> tuple[dict[str, Array], float | None]:
     arrays |= {s.name: np.full(rows, np.nan) for s in CYCLE_SIGNALS}
     arrays["load"] = log.load
     arrays["reference"][:, :2] = log.reference
+    if log.load_attitude is not None:
+        arrays["load_attitude"] = log.load_attitude
     arrays |= {name: log.drones[name] for name in log.drones if name in arrays}
     ends = ends_of(log.load, log.n)
     arrays["directions"], reach = _unit(ends[:, :, 0] - log.drones["positions"])

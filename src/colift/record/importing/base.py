@@ -126,6 +126,8 @@ class Log:
         Arrays (rows, n, k), with the names and components of :data:`DRONE_COLUMNS`.
     findings : sequence of Finding
         What is wrong with it.
+    load_attitude : (rows, 4) array, optional
+        Of a rigid load, wxyz, load to world; none where the log has none.
 
     """
 
@@ -134,6 +136,7 @@ class Log:
     reference: Array
     drones: Mapping[str, Array]
     findings: Sequence[Finding] = ()
+    load_attitude: Array | None = None
 
     @property
     def n(self) -> int:

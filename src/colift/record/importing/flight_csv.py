@@ -1,7 +1,7 @@
 """Whole flights as CSV: one row a time, the load, its reference and every drone in columns.
 
 Columns, in SI units and a world frame with z up unless the reader is told otherwise: ``t``;
-``load_{x,y,z}``, ``load_v{x,y,z}``; ``ref_{x,y,z}``, ``ref_v{x,y,z}``; and for drone K = 0, 1, ...:
+``load_{x,y,z}``, ``load_v{x,y,z}``, ``load_q{w,x,y,z}`` (attitude of a rigid load, load to world); ``ref_{x,y,z}``, ``ref_v{x,y,z}``; and for drone K = 0, 1, ...:
 ``uavK_{x,y,z}``, ``uavK_v{x,y,z}``, ``uavK_q{w,x,y,z}`` (attitude, body to world; as ``uavK_q{0,1,2,3}`` the
 order must be told), ``uavK_w{x,y,z}`` (body rates), ``uavK_fd{x,y,z}`` (total force wanted on the load, as this
 drone computed it) and ``uavK_mu{x,y,z}`` (this cable's share of it). Time and positions are required, the rest may
@@ -126,7 +126,7 @@ def _header(lines: io.StringIO) -> tuple[list[str], str]:
 
 def _quaternions(path: Path, header: list[str], told: Reading) -> list[str]:
     """The header with the numbered components of quaternions named, in the order that was told."""
-    numbered = [name for name in header if re.fullmatch(r"uav\d{1,4}_q[0-3]", name)]
+    numbered = [name for name in header if re.fullmatch(r"(uav\d{1,4}|load)_q[0-3]", name)]
     if not numbered:
         return header
     if told.quaternion is None:
@@ -143,6 +143,7 @@ def _names(n: int) -> tuple[list[str], list[list[str]]]:
     """Columns that a file of n drones must have, and the vectors that it may have."""
     must = ["t", *(f"load_{axis}" for axis in _AXES)]
     may = [[f"{prefix}{axis}" for axis in _AXES] for prefix in ("load_v", "ref_", "ref_v")]
+    may.append([f"load_q{axis}" for axis in "wxyz"])
     for k in range(n):
         must += [f"uav{k}_{axis}" for axis in _AXES]
         may += [
@@ -260,6 +261,7 @@ def _log(column: Mapping[str, Array], time: Array, n: int) -> Log:
         load=np.stack([vectors("load_"), vectors("load_v")], axis=1),
         reference=np.stack([vectors("ref_"), vectors("ref_v")], axis=1),
         drones=drones,
+        load_attitude=vectors("load_q", "wxyz") if "load_qw" in column else None,
     )
 
 
@@ -277,7 +279,19 @@ def _up(log: Log) -> Log:
 
     drones = {k: v if k in ("attitudes", "rates") else world(v) for k, v in log.drones.items()}
     drones["rates"] = log.drones["rates"] * [1.0, -1.0, -1.0]
+    drones["attitudes"] = _attitude_up(log.drones["attitudes"])
+    turned = None if log.load_attitude is None else _attitude_up(log.load_attitude)
+    return replace(
+        log,
+        load=world(log.load),
+        reference=world(log.reference),
+        drones=drones,
+        load_attitude=turned,
+    )
+
+
+def _attitude_up(attitudes: Array) -> Array:
+    """Quaternions (..., 4) of bodies."""
     # R_up = N R F with N = [[0,1,0],[1,0,0],[0,0,-1]] (half a turn about x+y) and F = diag(1,-1,-1) (about x).
-    w, x, y, z = np.moveaxis(log.drones["attitudes"], -1, 0)
-    drones["attitudes"] = math.sqrt(0.5) * np.stack([w + z, x + y, x - y, w - z], axis=-1)
-    return replace(log, load=world(log.load), reference=world(log.reference), drones=drones)
+    w, x, y, z = np.moveaxis(attitudes, -1, 0)
+    return np.asarray(math.sqrt(0.5) * np.stack([w + z, x + y, x - y, w - z], axis=-1))
