@@ -120,7 +120,14 @@ def test_points_gather_seeds_and_tell_held_missed_and_lost_apart() -> None:
     assert header[:2] == ["mass", "held (95 %)"]
     assert [line[1] for line in lines] == ["2/5 (5-86 %)", "1/2 (1-99 %)", "refused"]
     assert lines[2][2:] == ["-"] * len(COLUMNS)
-    box = [{**row(1.0, 30.0), "attitude_max_deg": 2.5, "min_drone_distance_m": 0.75}]
+    box = [
+        {
+            **row(1.0, 30.0),
+            "attitude_max_deg": 2.5,
+            "attitude_rms_deg": 1.0,
+            "min_drone_distance_m": 0.75,
+        }
+    ]
     (_, header, lines) = sweep_tables(Swept(box, overs))[0]
     assert header[3:5] == ["attitude (deg)", "apart (m)"]
     assert lines[0][3:5] == ["2.5", "0.75"]

@@ -14,6 +14,7 @@ from colift.flight.flight import Flight
 from colift.kernel.signals import CYCLE_SIGNALS
 from colift.kernel.status import Status
 from colift.mission import load_mission
+from colift.mission.outlook import bound, outlook
 from colift.record.metrics import compute
 from colift.world.fault.base import LOAD
 from colift.world.fault.battery_low import BatteryLow
@@ -282,7 +283,7 @@ def test_thresholds_are_settings():
                                  {"detection.speed": 10.0}))  # fmt: skip
     flight.run()
     assert flight.membership.found == []
-    assert Residuals().params(colift.team.Team.uniform(3)).size == 13
+    assert Residuals().params(colift.team.Team.uniform(3)).size == 14
 
 
 def alarms(distances, dt=0.005):
@@ -498,7 +499,9 @@ def test_descent_is_smooth_starts_as_told_and_ends_at_rest():
 
 
 def cannot_carry(flight, rest):
-    return flight.membership.cannot_carry(rest, flight.drones, flight.bus, flight.parts)
+    directions = flight.bus.desired_directions[[flight.drones.index(drone) for drone in rest]]
+    parts = bound(flight.parts, rest)
+    return outlook(flight.mission.team.of(rest), parts, directions, flight.clock, 10.0).reason
 
 
 def too_heavy():

@@ -170,13 +170,14 @@ def points(rows: Sequence[Mapping[str, Any]], overs: Sequence[Over]) -> list[Poi
     grouped: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
         grouped.setdefault(tuple(row[over.path] for over in overs), []).append(row)
+    rigid = any(judge.load_of(row) == judge.RIGID for row in rows)
+    shown = COLUMNS | RIGID if rigid else COLUMNS
     found = []
     for values, flights in grouped.items():
         fates = Counter(map(judge.fate, flights))
         ended = [row for row in flights if judge.fate(row) in ("held", "missed")]
         spread = {
-            name: _spread([float(row.get(name, math.nan)) for row in ended])
-            for name in COLUMNS | RIGID
+            name: _spread([float(row.get(name, math.nan)) for row in ended]) for name in shown
         }
         wrong = Counter(
             str(row.get("error") or row.get("reasons") or row.get("outcome"))

@@ -212,8 +212,9 @@ class Swept:
     @property
     def metrics(self) -> Mapping[str, str]:
         """Names of the numbers that are shown, and how they are called."""
-        rigid = any(not math.isnan(point.spread["attitude_max_deg"][0]) for point in self.points)
-        return RIGID if rigid else COLUMNS
+        return (
+            RIGID if any("attitude_max_deg" in point.spread for point in self.points) else COLUMNS
+        )
 
     @property
     def points(self) -> list[Point]:
