@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from colift.control.allocation.base import Status
-from colift.control.allocation.sqp import SqpAllocator
+from colift.control.allocation.sqp import Sqp, SqpAllocator
 from colift.team.geometry import ring
 
 sizes = st.integers(1, 9)
@@ -63,6 +63,7 @@ def random_rotation(rng):
     return q if np.linalg.det(q) > 0.0 else -q
 
 
+@example(n=3, mu=0.8802456675221252, seed=27498)
 @settings(max_examples=60, deadline=None)
 @given(n=st.integers(3, 8), mu=st.floats(0.05, 1.0), seed=seeds)
 def test_turning_the_problem_turns_the_whole_answer(n, mu, seed):
@@ -73,7 +74,10 @@ def test_turning_the_problem_turns_the_whole_answer(n, mu, seed):
     force = np.array([0.0, 0.0, 2.2]) + 0.3 * rng.normal(size=3)
     one = solve(n, mu, start, force)
     two = solve(n, mu, start @ R.T, R @ force)
-    assert two.iterations == one.iterations
+    if two.iterations != one.iterations:  # rounding decides where the residual is at the tolerance
+        fewer = min(one, two, key=lambda answer: answer.iterations)
+        assert abs(two.iterations - one.iterations) == 1
+        assert fewer.kkt_residual > 0.99 * Sqp().tolerance
     assert abs(two.objective - one.objective) <= 1e-10 * (1.0 + mu)
     assert_allclose(two.tensions, one.tensions, atol=1e-7)
     assert_allclose(two.directions, one.directions @ R.T, atol=1e-7)
