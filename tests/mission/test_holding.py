@@ -19,7 +19,7 @@ from colift.study.holding import judge
 from colift.team import Body, Team
 from colift.team.holding import holding
 from colift.team.load import box_inertia
-from colift.team.plan import plan
+from colift.team.plan import plan, taken_over
 
 SIZE = np.array([0.6, 0.4, 0.2])
 BOX: dict[str, Any] = {
@@ -101,6 +101,21 @@ def test_ends_in_a_row_are_warned_of() -> None:
         {**BOX, "load": {**BOX["load"], "attachments": row}, "drones": {"count": 3}}
     )
     assert any("rank: the cables make 5 of six" in str(each) for each in warnings_of(mission))
+
+
+def test_cables_that_others_have_left_alone_stay_where_they_are():
+    """The opposite corners bear nearly all of the load, and no cable is let go."""
+    team = load_mission(BOX).team
+    directions, _ = plan(team)
+    rest = team.of([1, 2, 3])
+    forces = taken_over(rest, directions[1:], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])
+    pulls = np.linalg.norm(forces, axis=1)
+    assert forces / pulls[:, None] == pytest.approx(directions[1:])
+    assert pulls[1] == pytest.approx(0.1 / 3)
+    assert pulls[0] == pytest.approx(pulls[2], rel=0.05)
+    assert forces.sum(axis=0)[2] == pytest.approx(-1.0, abs=0.03)
+    falling = taken_over(rest, directions[1:], [0.0, 0.0, -9.81], [1.0, 0.0, 0.0, 0.0])
+    assert np.isfinite(falling).all()
 
 
 def test_what_each_loss_costs_is_told_before_the_flight() -> None:

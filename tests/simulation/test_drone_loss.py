@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import colift
+from colift.control.observation.momentum import Momentum
 from colift.errors import MissionError
+from colift.team import Team
 
 
 def flown(mission="paper-spiral", *losses, **settings):
@@ -82,3 +84,29 @@ def test_only_a_flying_drone_can_be_lost(losses):
 def test_the_last_drone_cannot_be_lost():
     with pytest.raises(MissionError, match="not the last one"):
         flown("paper-spiral", (1.0, 0), (2.0, 1), (3.0, 2), (4.0, 3))
+
+
+def test_who_leaves_in_motion_is_no_blow_to_the_load():
+    """The observer of the whole momentum knows what the lost drone has carried of it; who joins brings its own along."""
+    team, part = Team.uniform(3), Momentum()
+    memory, v = part.memory(team), np.tile([1.5, -1.0, 0.5], (3, 1))
+    load = np.array([[0.0, 0.0, 1.0], v[0]])
+
+    def observed(team, memory):
+        x = np.array([[np.cos(a), np.sin(a), 1.7] for a in range(team.n)])
+        level = np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1))
+        thrust = 9.81 * (team.load_mass + team.masses.sum()) / team.n
+        for _ in range(3):
+            found = part.call(
+                team, memory, dt=0.01, estimated_velocities=v[: team.n], estimated_load=load, estimated_positions=x,
+                estimated_ends=np.tile(load, (team.n, 1, 1)), estimated_attitudes=level, thrusts=np.full(team.n, thrust),
+                received_tensions=np.full(team.n, 1.0),
+            )[0]  # fmt: skip
+        return found.estimated_forces.sum(axis=0)
+
+    assert np.abs(observed(team, memory)).max() < 1e-9
+    two = team.of([0, 2])
+    left = part.carry_over(memory, part.memory(two), np.array([0, 2]))
+    assert np.abs(observed(two, left)).max() < 0.1  # the momentum of 0.5 kg would be 10 N
+    again = part.carry_over(left, part.memory(team), np.array([0, -1, 1]))
+    assert np.abs(observed(team, again)).max() < 0.1

@@ -269,6 +269,24 @@ def test_a_team_that_is_put_together_anew_in_full_motion_flies_on_as_if_nothing_
     assert np.linalg.norm(metrics.tracking_error(recording), axis=1).max() < 0.005
 
 
+def test_a_reference_that_asks_too_much_of_fewer_drones_slows_down() -> None:
+    event = {"at": 4.0, "field": "drones.lose", "value": 1}
+    change = {"drones.count": 6, "reference.period": 7.6, "events": [event], "timing.duration": 9.0}
+    flight = Flight(load_mission("box-figure-eight", change))
+    recording = flight.run()
+    pace = flight.membership.outlook.pace
+    assert 0.2 <= pace < 1.0
+    rate = recording["clock"][:, 1]
+    assert rate[recording.time < 4.0] == pytest.approx(1.0)
+    assert rate[recording.time > 5.1] == pytest.approx(pace)
+    slope = np.gradient(recording["reference"], recording.time, axis=0)
+    calm = np.abs(recording.time - 4.0) > 0.05
+    for order in range(2):  # velocity and acceleration are those of the way that is flown
+        off = slope[:, order] - recording["reference"][:, order + 1]
+        assert np.abs(off[calm][2:-2]).max() < 0.02
+    assert "at " + f"{pace:.0%} of the pace" in str(flight.membership.outlook)
+
+
 def test_two_cables_do_not_hold_a_box_and_it_comes_down() -> None:
     events = [{"at": 1.0 + i, "field": "drones.lose", "value": i} for i in range(2)]
     recording = Flight(load_mission({**BOX, "events": events})).run()

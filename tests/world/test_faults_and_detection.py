@@ -286,10 +286,10 @@ def test_thresholds_are_settings():
     assert Residuals().params(colift.team.Team.uniform(3)).size == 14
 
 
-def alarms(distances, dt=0.005):
+def alarms(distances, dt=0.005, part=None, memory=None):
     """Whether a drone above its load is judged lost as the distance between them takes these values."""
-    part, team = Residuals(), colift.team.Team.uniform(1)
-    memory, carrying = part.memory(team), np.ones(1)
+    part, team = part or Residuals(), colift.team.Team.uniform(1)
+    memory, carrying = part.memory(team) if memory is None else memory, np.ones(1)
     down, q = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
     found = []
     for d, speed in zip(distances, np.gradient(distances, dt), strict=True):
@@ -301,6 +301,25 @@ def alarms(distances, dt=0.005):
         )  # fmt: skip
         found.append(carrying[0] == 0.0)
     return np.array(found)
+
+
+def test_after_a_change_of_the_team_nobody_is_judged_for_a_while():
+    """A rigid load's cables go slack and come taut until it hangs anew: what grows then is no sign, and afterwards it is."""
+    t = np.arange(0.0, 1.5, 0.005)
+    parting = 1.0 + 0.5 * np.maximum(t - 0.8, 0.0)
+    at = {}
+    for grace in (0.0, 1.2):
+        part = Residuals(grace=grace)
+        team = colift.team.Team.uniform(1)
+        memory = part.carry_over(part.memory(team), part.memory(team), np.array([0]))
+        found = alarms(parting, part=part, memory=memory)
+        assert found.any()
+        at[grace] = t[np.argmax(found)]
+    assert 0.8 < at[0.0] < 0.9
+    assert 1.19 < at[1.2] < 1.25
+    box = load_mission("box-figure-eight").team
+    assert Residuals().grace_of(box) == 4.0
+    assert Residuals().grace_of(team) == 0.0
 
 
 def test_a_cable_that_was_slack_for_long_catches_without_an_alarm():

@@ -80,13 +80,17 @@ def feasibility(
         _emit(loaded, found, conflicts, notes, warnings)
     else:
         _say(loaded, part, found)
-        show_notes(notes)
-        show_warnings(warnings)
-        for conflict in conflicts:
-            out.print(f"[red]conflict[/red]: {escape(conflict)}", highlight=False)
-        out.print("not feasible" if conflicts else "feasible")
+        _conclude(conflicts, notes, warnings)
     if conflicts:
         raise typer.Exit(EXIT_ERROR)
+
+
+def _conclude(conflicts: Sequence[str], notes: Sequence[str], warnings: Sequence[str]) -> None:
+    show_notes(notes)
+    show_warnings(warnings)
+    for conflict in conflicts:
+        out.print(f"[red]conflict[/red]: {escape(conflict)}", highlight=False)
+    out.print("not feasible" if conflicts else "feasible")
 
 
 def _judge_rigid(mission: Mission, *, as_json: bool) -> None:
@@ -99,20 +103,15 @@ def _judge_rigid(mission: Mission, *, as_json: bool) -> None:
     found = judge(mission)
     conflicts = [f"{name}: {text}" for name, text in found.holding.problems()]
     conflicts += part.cannot_hold(team, found.limits, mission.start_directions())
-    if found.demand is not None and not found.demand.within:
-        conflicts.append(f"reference: {_demand(found.demand, drones)}")
-    warnings = [f"{name}: {text}" for name, text in found.holding.warnings()]
-    warnings += [str(each) for each in warnings_of(mission)]
+    if found.demand is not None:
+        conflicts += [f"reference {text}" for text in found.demand.problems(drones)]
+    warnings = [str(each) for each in warnings_of(mission)]
     notes = [str(each) for each in notes_of(mission)]
     if as_json:
         _emit_rigid(mission, found, conflicts, notes, warnings)
     else:
         _say_rigid(mission, found)
-        show_notes(notes)
-        show_warnings(warnings)
-        for conflict in conflicts:
-            out.print(f"[red]conflict[/red]: {escape(conflict)}", highlight=False)
-        out.print("not feasible" if conflicts else "feasible")
+        _conclude(conflicts, notes, warnings)
     if conflicts:
         raise typer.Exit(EXIT_ERROR)
 

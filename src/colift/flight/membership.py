@@ -18,6 +18,9 @@ from colift.team import Team
 from colift.team.geometry import Array
 from colift.team.plan import taken_over
 
+LEVELLED = 1.4
+"""Time in which a rigid load that is brought down loses the attitude that was wanted of it, s."""
+
 
 @dataclass
 class Membership:
@@ -87,7 +90,7 @@ class Membership:
             return {"reference": reference.upright()} if found.upright else {}
         if not {*before} - {*drones}:  # who has joined is no reason to come down
             return {}
-        self.outlook = found._replace(pace=1.0)
+        self.outlook = found._replace(pace=1.0, within=max(found.within, LEVELLED))
         self.descent = f"descended from t = {time:g} s: {found.reason}"
         position, velocity = bus.reference[:2].tolist()
         return {"reference": Descent(position=position, velocity=velocity, at=clock)}

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from colift.control.allocation.base import AllocatorPart
 from colift.control.reference.base import ReferencePart
 from colift.kernel.math import leaning
-from colift.mission.planned import ROOM, STEP, TAUT, most_asked, wanted
+from colift.mission.planned import ROOM, STEP, most_asked, wanted
 from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array
@@ -35,6 +35,8 @@ TIMES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """In which a load comes to lean, s."""
 CALM = 0.3
 """Share of the rotors' angular acceleration that a plan may ask of a team that has just changed: most of them are for coming to rest."""
+TAUT = 0.1
+"""Least that it may ask of a cable, over its part of the force: with less it is slack at the first gust."""
 FEWEST = 3
 """Cables that hold all of a rigid load's attitude."""
 

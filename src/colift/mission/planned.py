@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 ROOM = 0.65
 """Share of the rotors' angular acceleration that a plan may ask for: the rest is for corrections."""
-TAUT = 0.1
-"""Least that a plan may ask of a cable, over its part of the force: with less it is slack at the first gust."""
 WINDOW = 0.04
 """Time over which it is taken, s: a jump of what is wanted, such as of a snap, asks for no more than a drone falls behind meanwhile."""
 STEP, MOST = 0.02, 1500
@@ -65,10 +63,20 @@ class Demand(NamedTuple):
     slack: tuple[float, int]
     """When, s, and of which."""
 
-    @property
-    def within(self) -> bool:
-        """Whether drones can do it, and cables."""
-        return self.share <= ROOM and self.taut >= TAUT
+    def problems(self, drones: Sequence[int]) -> list[str]:
+        """Why these drones cannot do it, to go on after the reference's name."""
+        when, which = self.slack
+        found = []
+        if self.taut < 0.0:
+            found.append(
+                f"asks cable {drones[which]} at {when:.3g} s to push: tilt the load less, or move it more gently"
+            )
+        if self.share > ROOM:
+            found.append(
+                f"asks drone {drones[self.drone]} at {self.time:.3g} s to turn its thrust with {self.turning:.3g} rad/s^2, and of the {self.limit:.3g} "
+                f"that its rotors give {ROOM:.0%} may be planned: move more slowly, turn the load less, or attach the cables wider apart"
+            )
+        return found
 
 
 def wanted(
@@ -160,7 +168,7 @@ def demand_of(mission: Mission) -> Demand | None:
 
 
 def planned_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]:
-    """A problem where the reference of a rigid load asks a drone for a faster turn than its rotors give."""
+    """Problems where cables cannot hold a rigid load, or its reference asks for what neither they nor the rotors give."""
     drones, reference = frame.first_drones(), parts["reference"]
     assert isinstance(reference, ReferencePart)
     team = frame.team.of(drones)
@@ -174,13 +182,5 @@ def planned_checks(frame: Frame, parts: Mapping[str, Part]) -> Iterable[Problem]
         yield Problem("load.attachments", "", f"{name}: {message}")
     times, poses = wanted(team, reference, 0.0, frame.timing.duration)
     most = most_asked(team, bound, times, poses)
-    if most is not None and most.taut < 0.0:
-        when, which = most.slack
-        message = f"asks cable {drones[which]} at {when:.3g} s to push: tilt the load less, or move it more gently"
-        yield Problem("reference", "", message)
-    if most is not None and most.share > ROOM:
-        message = (
-            f"asks drone {drones[most.drone]} at {most.time:.3g} s to turn its thrust with {most.turning:.3g} rad/s^2, and of the {most.limit:.3g} "
-            f"that its rotors give {ROOM:.0%} may be planned: move more slowly, turn the load less, or attach the cables wider apart"
-        )
+    for message in most.problems(drones) if most is not None else ():
         yield Problem("reference", "", message)

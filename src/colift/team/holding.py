@@ -101,17 +101,11 @@ def _swings(
     arms: Array, directions: Array, tensions: Array, lengths: Array, mass: float, inertia: Array
 ) -> Array:
     """Frequencies (k,) of the motions that taut cables leave free, rad/s; negative those of which the load falls away."""
-    slopes = np.hstack([directions, np.cross(arms, directions)])  # of each distance by the pose
+    maps = wrench_map(arms).reshape(6, -1, 3).transpose(1, 0, 2)
+    slopes = np.einsum("ikj,ij->ik", maps, directions)  # of each distance by the pose
     bend = np.zeros((6, 6))
-    for rho, alpha, T, L in zip(arms, directions, tensions, lengths, strict=True):
-        across = np.eye(3) - np.outer(alpha, alpha)
-        lever = np.hstack(
-            [
-                np.eye(3),
-                -np.array([[0, -rho[2], rho[1]], [rho[2], 0, -rho[0]], [-rho[1], rho[0], 0]]),
-            ]
-        )
-        bend += T / L * lever.T @ across @ lever
+    for G, rho, alpha, T, L in zip(maps, arms, directions, tensions, lengths, strict=True):
+        bend += T / L * G @ (np.eye(3) - np.outer(alpha, alpha)) @ G.T
         # The end itself turns on a circle: exp(theta) rho to second order.
         bend[3:, 3:] += T * (
             0.5 * (np.outer(rho, alpha) + np.outer(alpha, rho)) - rho @ alpha * np.eye(3)

@@ -114,28 +114,21 @@ def taken_over(
     Their tensions come as near to the load's motion, with this acceleration (3,) in this attitude (4,), as pulls can. No cable is let
     go slack.
     """
+    weight = team.load_mass * max(team.gravity, 1e-3)
     force = team.load_mass * np.array(acceleration, dtype=float)
-    force[2] += team.load_mass * max(team.gravity, 1e-3)
+    force[2] = max(force[2] + weight, 0.1 * weight)  # as position control plans
     W = float(np.linalg.norm(force))
     arms = team.levers @ matrix_of(attitude).T
     reach = max(float(np.abs(arms).max()), 1e-6)
     columns = np.vstack([directions.T, np.cross(arms, directions).T / reach])
     wanted = np.concatenate([-force / W, np.zeros(3)])
-    least = KEPT / team.n
-    pulls = np.full(team.n, least)
-    free = np.ones(team.n, dtype=bool)
-    for _ in range(team.n):
-        left = wanted - columns[:, ~free] @ pulls[~free]
-        pulls[free] = np.linalg.lstsq(columns[:, free], left, rcond=1e-9)[0]
-        low = free & (pulls < least)
-        if not low.any() or low.sum() == free.sum():
-            break
-        pulls[low] = least
-        free &= ~low
+    pulls = _at_least(
+        columns, wanted, np.full(team.n, 1.0 / team.n), np.full(team.n, KEPT / team.n)
+    )
     turned = matrix_of(zero_yaw_quaternion(force[None] / W)[0])
     w, _, _, z = np.asarray(attitude, dtype=float)
     size = max(math.hypot(w, z), 1e-9)
-    forces = np.maximum(pulls, least)[:, None] * directions
+    forces = pulls[:, None] * directions
     return np.asarray(forces @ turned @ matrix_of((w / size, 0.0, 0.0, z / size)))
 
 
@@ -218,24 +211,31 @@ def _outward(arms: Array, lengths: Array, angle: float, even: float) -> Array:
 def _held(arms: Array, directions: Array, weight: float, floors: Array) -> Array:
     """Cable forces (n, 3) near these directions that balance the weight."""
     n = len(arms)
-    upright = np.full(n, weight / n)
-    free = np.ones(n, dtype=bool)
-    for _ in range(n):
-        rows = np.vstack([np.ones(n), arms[:, 0], arms[:, 1]])
-        wanted = np.array([weight, 0.0, 0.0]) - rows @ upright
-        step = np.linalg.lstsq(rows[:, free], wanted, rcond=1e-9)[0]
-        upright[free] += step
-        low = free & (upright < floors)
-        upright[low] = floors[low]
-        if not low.any() or low.sum() == free.sum():
-            break
-        free &= ~low
+    rows = np.vstack([np.ones(n), arms[:, 0], arms[:, 1]])
+    wanted = np.array([weight, 0.0, 0.0])
+    upright = _at_least(rows, wanted, np.full(n, weight / n), floors)
     forces = directions * (upright / -directions[:, 2])[:, None]
     balance = wrench_map(arms)
     wanted = np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0]) - balance @ forces.ravel()
     step = np.linalg.lstsq(balance, wanted, rcond=1e-9)[0].reshape(n, 3)
     corrected = forces + step
     return corrected if np.all(-corrected[:, 2] > 0.5 * floors) else forces
+
+
+def _at_least(rows: Array, wanted: Array, start: Array, floors: Array) -> Array:
+    """Values (n,) near ``start``, none below its floor, of which ``rows`` make what is wanted as nearly as they can."""
+    values, free = start.copy(), np.ones(len(start), dtype=bool)
+    for _ in start:
+        step = np.linalg.lstsq(rows[:, free], wanted - rows @ values, rcond=1e-9)[0]
+        values[free] += step
+        low = free & (values < floors)
+        if not low.any():
+            break
+        values[low] = floors[low]
+        if low.sum() == free.sum():
+            break
+        free &= ~low
+    return np.asarray(values)
 
 
 def _clearance(arms: Array, lengths: Array, forces: Array, needed: Array, downwash: float) -> float:

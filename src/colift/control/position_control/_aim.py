@@ -117,7 +117,7 @@ def look_ahead(i, fresh, dt, keep, lag, p, memory, o, u, attitudes, turning):  #
     """What the thrust vector ``p`` (3,) that is planned of drone i, free of any feedback, will be while a command acts.
 
     Half a period of it is added to ``u[i]``, ``lag`` of it to the thrust, which is returned; its angular acceleration, body frame, is
-    put into ``turning[i]``. ``memory[o : o + 9]`` holds the last planned direction, its rate and filtered second derivative.
+    put into ``turning[i]``. ``memory[o : o + 9]`` holds the last planned vector, its rate and filtered second derivative.
     """
     q = attitudes[i]
     size = math.sqrt(max(p[0] * p[0] + p[1] * p[1] + p[2] * p[2], 1e-12))
@@ -127,9 +127,8 @@ def look_ahead(i, fresh, dt, keep, lag, p, memory, o, u, attitudes, turning):  #
         bend = 0.0 if fresh else (rate - memory[o + 3 + k]) / dt
         memory[o + k], memory[o + 3 + k] = p[k], rate
         memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend
-        rate += (
-            0.5 * dt * memory[o + 6 + k]
-        )  # a difference is that of the middle of the last period
+        # A difference is that of the middle of the last period.
+        rate += 0.5 * dt * memory[o + 6 + k]
         u[i, k] += 0.5 * dt * rate
         more += lag * rate * p[k] / size
     x, y, _ = quaternion.into_body(

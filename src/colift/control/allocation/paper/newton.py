@@ -229,6 +229,54 @@ def turning_scale(n, mu):  # type: ignore[no-untyped-def]
 
 
 @inline
+def violation(x, y, z, t, l0, l1, l2, mu, M, along, across):  # type: ignore[no-untyped-def]
+    """By how much one cable violates stationarity and the sign of an active bound's multiplier, squared; its multiplier is ``(l0, l1, l2)``."""
+    slope_T = t + l0 * x + l1 * y + l2 * z
+    px = 2.0 * mu * (M[0] * x + M[1] * y + M[2] * z) + t * l0
+    py = 2.0 * mu * (M[1] * x + M[3] * y + M[4] * z) + t * l1
+    pz = 2.0 * mu * (M[2] * x + M[4] * y + M[5] * z) + t * l2
+    radial = px * x + py * y + pz * z
+    px -= radial * x
+    py -= radial * y
+    pz -= radial * z
+    found = across * (px * px + py * py + pz * pz)
+    if t > 0.0 or slope_T < 0.0:
+        found += along * slope_T * slope_T
+    return found
+
+
+@inline
+def tangents(x, y, z):  # type: ignore[no-untyped-def]
+    """Basis of the tangent plane at a direction without trigonometry (Duff et al. 2017): two unit vectors."""
+    sign = math.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    c = x * y * a
+    return 1.0 + sign * x * x * a, sign * c, -sign * x, c, sign + y * y * a, -y
+
+
+@inline
+def curvature(x, y, z, bx, by, bz, dx, dy, dz, t, radial, v1, v2, mu, M):  # type: ignore[no-untyped-def]
+    """One cable's block ``C_i`` in its tangent plane, and the slope ``q_i`` there."""
+    # M times the three axes of the cable's frame.
+    px = M[0] * x + M[1] * y + M[2] * z
+    py = M[1] * x + M[3] * y + M[4] * z
+    pz = M[2] * x + M[4] * y + M[5] * z
+    mbx = M[0] * bx + M[1] * by + M[2] * bz
+    mby = M[1] * bx + M[3] * by + M[4] * bz
+    mbz = M[2] * bx + M[4] * by + M[5] * bz
+    mdx = M[0] * dx + M[1] * dy + M[2] * dz
+    mdy = M[1] * dx + M[3] * dy + M[4] * dz
+    mdz = M[2] * dx + M[4] * dy + M[5] * dz
+    base = 2.0 * mu * (px * x + py * y + pz * z) + t * radial
+    c11 = 2.0 * mu * (bx * mbx + by * mby + bz * mbz) - base - v1 * v1
+    c12 = 2.0 * mu * (bx * mdx + by * mdy + bz * mdz) - v1 * v2
+    c22 = 2.0 * mu * (dx * mdx + dy * mdy + dz * mdz) - base - v2 * v2
+    q1 = 2.0 * mu * (bx * px + by * py + bz * pz) - t * v1
+    q2 = 2.0 * mu * (dx * px + dy * py + dz * pz) - t * v2
+    return c11, c12, c22, q1, q2
+
+
+@inline
 def kkt_residual(n, mu, T, alpha, M, lam):  # type: ignore[no-untyped-def]
     """Largest violation of stationarity and of the sign of an active bound's multiplier.
 
@@ -240,23 +288,11 @@ def kkt_residual(n, mu, T, alpha, M, lam):  # type: ignore[no-untyped-def]
     l0, l1, l2 = lam[0], lam[1], lam[2]
     worst = 0.0
     for i in range(n):
-        x = alpha[3 * i]
-        y = alpha[3 * i + 1]
-        z = alpha[3 * i + 2]
-        t = T[i]
-        slope_T = t + l0 * x + l1 * y + l2 * z
-        px = 2.0 * mu * (M[0] * x + M[1] * y + M[2] * z) + t * l0
-        py = 2.0 * mu * (M[1] * x + M[3] * y + M[4] * z) + t * l1
-        pz = 2.0 * mu * (M[2] * x + M[4] * y + M[5] * z) + t * l2
-        radial = px * x + py * y + pz * z
-        px -= radial * x
-        py -= radial * y
-        pz -= radial * z
-        violation = across * (px * px + py * py + pz * pz)
-        if t > 0.0 or slope_T < 0.0:
-            violation += along * slope_T * slope_T
-        if not violation <= worst:  # unlike max(), lets NaN through
-            worst = violation
+        found = violation(
+            alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2], T[i], l0, l1, l2, mu, M, along, across
+        )
+        if not found <= worst:  # unlike max(), lets NaN through
+            worst = found
     return math.sqrt(worst)
 
 
@@ -283,12 +319,7 @@ def assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S):  # type: igno
         y = alpha[3 * i + 1]
         z = alpha[3 * i + 2]
         t = T[i]
-        # Basis of the tangent plane without trigonometry (Duff et al. 2017).
-        sign = math.copysign(1.0, z)
-        a = -1.0 / (sign + z)
-        c = x * y * a
-        bx, by, bz = 1.0 + sign * x * x * a, sign * c, -sign * x
-        dx, dy, dz = c, sign + y * y * a, -y
+        bx, by, bz, dx, dy, dz = tangents(x, y, z)
         radial = l0 * x + l1 * y + l2 * z
         taut = t > 0.0 or radial < 0.0
         v1 = l0 * bx + l1 * by + l2 * bz
@@ -309,22 +340,9 @@ def assemble(n, fx, fy, fz, mu, T, alpha, M, lam, delta, rows, S):  # type: igno
             v1 = 0.0
             v2 = 0.0
             rows[o + 26] = 0.0
-        # M times the three axes of the cable's frame.
-        px = M[0] * x + M[1] * y + M[2] * z
-        py = M[1] * x + M[3] * y + M[4] * z
-        pz = M[2] * x + M[4] * y + M[5] * z
-        mbx = M[0] * bx + M[1] * by + M[2] * bz
-        mby = M[1] * bx + M[3] * by + M[4] * bz
-        mbz = M[2] * bx + M[4] * by + M[5] * bz
-        mdx = M[0] * dx + M[1] * dy + M[2] * dz
-        mdy = M[1] * dx + M[3] * dy + M[4] * dz
-        mdz = M[2] * dx + M[4] * dy + M[5] * dz
-        base = 2.0 * mu * (px * x + py * y + pz * z) + t * radial
-        c11 = 2.0 * mu * (bx * mbx + by * mby + bz * mbz) - base - v1 * v1
-        c12 = 2.0 * mu * (bx * mdx + by * mdy + bz * mdz) - v1 * v2
-        c22 = 2.0 * mu * (dx * mdx + dy * mdy + dz * mdz) - base - v2 * v2
-        q1 = 2.0 * mu * (bx * px + by * py + bz * pz) - t * v1
-        q2 = 2.0 * mu * (dx * px + dy * py + dz * pz) - t * v2
+        c11, c12, c22, q1, q2 = curvature(
+            x, y, z, bx, by, bz, dx, dy, dz, t, radial, v1, v2, mu, M
+        )  # fmt: skip
         # C^-1 from its two eigenvalues, each replaced by max(|.|, delta).
         mean = 0.5 * (c11 + c22)
         half = 0.5 * (c11 - c22)

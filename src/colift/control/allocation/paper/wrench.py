@@ -26,9 +26,12 @@ from colift.control.allocation.paper.newton import (
     ITERATION_LIMIT,
     MAX_TURN,
     NOT_FINITE,
+    curvature,
     measure,
     optimal_objective,
+    tangents,
     turning_scale,
+    violation,
 )
 from colift.kernel.jit import inline
 from colift.kernel.math.small import solve_symmetric
@@ -149,20 +152,12 @@ def kkt_residual(n, mu, s, T, alpha, M, lam):  # type: ignore[no-untyped-def]
     across = 1.0 / turning_scale(n, mu) ** 2
     worst = 0.0
     for i in range(n):
-        x, y, z = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
         l0, l1, l2 = pull(lam, s, i)
-        t = T[i]
-        slope_T = t + l0 * x + l1 * y + l2 * z
-        px = 2.0 * mu * (M[0] * x + M[1] * y + M[2] * z) + t * l0
-        py = 2.0 * mu * (M[1] * x + M[3] * y + M[4] * z) + t * l1
-        pz = 2.0 * mu * (M[2] * x + M[4] * y + M[5] * z) + t * l2
-        radial = px * x + py * y + pz * z
-        px, py, pz = px - radial * x, py - radial * y, pz - radial * z
-        violation = across * (px * px + py * py + pz * pz)
-        if t > 0.0 or slope_T < 0.0:
-            violation += along * slope_T * slope_T
-        if not violation <= worst:  # unlike max(), lets NaN through
-            worst = violation
+        found = violation(
+            alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2], T[i], l0, l1, l2, mu, M, along, across
+        )
+        if not found <= worst:  # unlike max(), lets NaN through
+            worst = found
     return math.sqrt(worst)
 
 
@@ -189,12 +184,7 @@ def assemble(n, kind, axis, f, mu, s, T, alpha, M, lam, delta, signed, rows, S):
         rx, ry, rz = s[3 * i], s[3 * i + 1], s[3 * i + 2]
         l0, l1, l2 = pull(lam, s, i)
         t = T[i]
-        # Basis of the tangent plane without trigonometry (Duff et al. 2017).
-        sign = math.copysign(1.0, z)
-        a = -1.0 / (sign + z)
-        c = x * y * a
-        bx, by, bz = 1.0 + sign * x * x * a, sign * c, -sign * x
-        dx, dy, dz = c, sign + y * y * a, -y
+        bx, by, bz, dx, dy, dz = tangents(x, y, z)
         radial = l0 * x + l1 * y + l2 * z
         taut = t > 0.0 or radial < 0.0
         v1 = l0 * bx + l1 * by + l2 * bz
@@ -211,22 +201,9 @@ def assemble(n, kind, axis, f, mu, s, T, alpha, M, lam, delta, signed, rows, S):
             v1 = 0.0
             v2 = 0.0
             rows[o + TAUT] = 0.0
-        # M times the three axes of the cable's frame.
-        px = M[0] * x + M[1] * y + M[2] * z
-        py = M[1] * x + M[3] * y + M[4] * z
-        pz = M[2] * x + M[4] * y + M[5] * z
-        mbx = M[0] * bx + M[1] * by + M[2] * bz
-        mby = M[1] * bx + M[3] * by + M[4] * bz
-        mbz = M[2] * bx + M[4] * by + M[5] * bz
-        mdx = M[0] * dx + M[1] * dy + M[2] * dz
-        mdy = M[1] * dx + M[3] * dy + M[4] * dz
-        mdz = M[2] * dx + M[4] * dy + M[5] * dz
-        base = 2.0 * mu * (px * x + py * y + pz * z) + t * radial
-        c11 = 2.0 * mu * (bx * mbx + by * mby + bz * mbz) - base - v1 * v1
-        c12 = 2.0 * mu * (bx * mdx + by * mdy + bz * mdz) - v1 * v2
-        c22 = 2.0 * mu * (dx * mdx + dy * mdy + dz * mdz) - base - v2 * v2
-        q1 = 2.0 * mu * (bx * px + by * py + bz * pz) - t * v1
-        q2 = 2.0 * mu * (dx * px + dy * py + dz * pz) - t * v2
+        c11, c12, c22, q1, q2 = curvature(
+            x, y, z, bx, by, bz, dx, dy, dz, t, radial, v1, v2, mu, M
+        )  # fmt: skip
         # C^-1 from its two eigenvalues, each at least delta in size.
         mean = 0.5 * (c11 + c22)
         half = 0.5 * (c11 - c22)
@@ -431,10 +408,9 @@ def solve(n, kind, axis, f, mu, tolerance, max_iterations, s, T, alpha, lam, wor
                 break
         if not accepted:
             damping *= 100.0
-            for k in range(
-                6 if solved else 0
-            ):  # a wrong multiplier may be why: keep the better one
-                lam[k] = S[RIGHT + k]
+            if solved:  # a wrong multiplier may be why: keep the better one
+                for k in range(6):
+                    lam[k] = S[RIGHT + k]
             continue
         damping = max(1.0, 0.1 * damping)
         for k in range(6):
