@@ -26,11 +26,6 @@ export const KINDS = {
     "shape": "M6 1.5Q10.5 1.5 10.5 6Q10.5 10.5 6 10.5Q1.5 10.5 1.5 6Q1.5 1.5 6 1.5Z",
     "tone": "good"
   },
-  "change": {
-    "word": "change",
-    "shape": "M2 4L10 4M2 8L10 8",
-    "tone": "good"
-  },
   "fault": {
     "word": "fault",
     "shape": "M2 2L10 10M10 2L2 10",
@@ -49,6 +44,11 @@ export const KINDS = {
   "join": {
     "word": "drone joins",
     "shape": "M6 1.5L6 10.5M1.5 6L10.5 6",
+    "tone": "good"
+  },
+  "change": {
+    "word": "change",
+    "shape": "M2 4L10 4M2 8L10 8",
     "tone": "good"
   },
   "descent": {

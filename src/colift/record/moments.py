@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 KINDS = {
     "phase": "phase",
     "command": "command",
-    "change": "change",
     "fault": "fault",
     "gap": "not measured",
     "departure": "drone leaves",
     "join": "drone joins",
+    "change": "change",
     "descent": "descent",
     "ground": "on the ground",
     "slack": "slack",

@@ -17,11 +17,11 @@ class Mark(NamedTuple):
 MARKS = {
     "phase": Mark("M3 1.5L3 10.5M3 2L10 4.5L3 7", "info"),
     "command": Mark("M6 1.5Q10.5 1.5 10.5 6Q10.5 10.5 6 10.5Q1.5 10.5 1.5 6Q1.5 1.5 6 1.5Z", "good"),
-    "change": Mark("M2 4L10 4M2 8L10 8", "good"),
     "fault": Mark("M2 2L10 10M10 2L2 10", "bad"),
     "gap": Mark("M1 6L4 6M8 6L11 6", "warn"),
     "departure": Mark("M1.5 6L10.5 6M7 2.5L10.5 6L7 9.5", "bad"),
     "join": Mark("M6 1.5L6 10.5M1.5 6L10.5 6", "good"),
+    "change": Mark("M2 4L10 4M2 8L10 8", "good"),
     "descent": Mark("M6 1.5L6 10.5M2.5 7L6 10.5L9.5 7", "bad"),
     "ground": Mark("M1.5 10.5L10.5 10.5M6 1.5L6 8M3.5 5.5L6 8L8.5 5.5", "info"),
     "slack": Mark("M1 4Q6 12 11 4", "warn"),
