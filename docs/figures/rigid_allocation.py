@@ -36,7 +36,8 @@ from colift.control.allocation.base import (
     ask,
 )
 from colift.control.allocation.limits.reach import farthest
-from colift.control.allocation.safe_wrench import MEMORY, PRICES, SafeWrench, outward
+from colift.control.allocation.limits.rigid import MEMORY
+from colift.control.allocation.safe_wrench import PRICES, SafeWrench, outward
 from colift.kernel.jit import address_of, monotonic_ns
 from colift.part import find
 from colift.team import Body, Team
