@@ -25,46 +25,108 @@ def eliminate_quad(vector, first, second, one, two, a, b, c, d):  # type: ignore
         vector[second + k] -= x * c + y * d
 
 
+def add_quad(target, at, source, begin, a):  # type: ignore[no-untyped-def]
+    """Add four numbers of an array, from ``begin`` on, times a to four of another, or of the same."""
+    for k in range(QUAD):
+        target[at + k] += a * source[begin + k]
+
+
+def solve_quad(vector, first, second, a, b, c):  # type: ignore[no-untyped-def]
+    """Solve for four columns at once: ``first`` becomes x = a first, ``second`` becomes c (second - b x)."""
+    for k in range(QUAD):
+        vector[first + k] *= a
+        vector[second + k] = (vector[second + k] - b * vector[first + k]) * c
+
+
 _four = ir.VectorType(ir.DoubleType(), QUAD)
+_FUSED = ("contract",)
 
 
-def _code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    array = context.make_array(signature.args[0])(context, builder, args[0])
+def _quad(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+    """Where four numbers of an array stand."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [place], inbounds=True), _four.as_pointer())
 
-    def at(place: Any) -> Any:
-        begin = builder.gep(array.data, [place], inbounds=True)
-        return builder.bitcast(begin, _four.as_pointer())
 
-    def spread(number: Any) -> Any:
-        one = builder.insert_element(ir.Constant(_four, ir.Undefined), number, ir.IntType(32)(0))
-        mask = ir.Constant(ir.VectorType(ir.IntType(32), QUAD), [0] * QUAD)
-        return builder.shuffle_vector(one, ir.Constant(_four, ir.Undefined), mask)
+def _spread(builder: Any, number: Any) -> Any:
+    """Four times the same number."""
+    nothing = ir.Constant(_four, ir.Undefined)
+    one = builder.insert_element(nothing, number, ir.IntType(32)(0))
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), QUAD), [0] * QUAD)
+    return builder.shuffle_vector(one, nothing, mask)
 
-    fused = ("contract",)
-    first, second, one, two = map(at, args[1:5])
-    a, b, c, d = map(spread, args[5:])
+
+def _eliminate_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    first, second, one, two = (
+        _quad(context, builder, signature.args[0], args[0], place) for place in args[1:5]
+    )
+    a, b, c, d = (_spread(builder, number) for number in args[5:])
     x, y = builder.load(one, align=8), builder.load(two, align=8)
     for target, p, q in ((first, a, b), (second, c, d)):
         value = builder.load(target, align=8)
-        value = builder.fsub(value, builder.fmul(x, p, flags=fused), flags=fused)
-        value = builder.fsub(value, builder.fmul(y, q, flags=fused), flags=fused)
+        value = builder.fsub(value, builder.fmul(x, p, flags=_FUSED), flags=_FUSED)
+        value = builder.fsub(value, builder.fmul(y, q, flags=_FUSED), flags=_FUSED)
         builder.store(value, target, align=8)
     return context.get_dummy_value()
 
 
+def _add_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    target = _quad(context, builder, signature.args[0], args[0], args[1])
+    source = builder.load(_quad(context, builder, signature.args[2], args[2], args[3]), align=8)
+    product = builder.fmul(source, _spread(builder, args[4]), flags=_FUSED)
+    value = builder.fadd(builder.load(target, align=8), product, flags=_FUSED)
+    builder.store(value, target, align=8)
+    return context.get_dummy_value()
+
+
+def _solve_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    first, second = (
+        _quad(context, builder, signature.args[0], args[0], place) for place in args[1:3]
+    )
+    a, b, c = (_spread(builder, number) for number in args[3:])
+    x = builder.fmul(builder.load(first, align=8), a, flags=_FUSED)
+    builder.store(x, first, align=8)
+    value = builder.load(second, align=8)
+    value = builder.fsub(value, builder.fmul(x, b, flags=_FUSED), flags=_FUSED)
+    builder.store(builder.fmul(value, c, flags=_FUSED), second, align=8)
+    return context.get_dummy_value()
+
+
 @intrinsic
-def _intrinsic(typingctx, vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
-    return types.void(vector, first, second, one, two, a, b, c, d), _code
+def _eliminate(typingctx, vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
+    return types.void(vector, first, second, one, two, a, b, c, d), _eliminate_code
 
 
-_eliminate_quad: Any = _intrinsic
+@intrinsic
+def _add(typingctx, target, at, source, begin, a):  # type: ignore[no-untyped-def]
+    return types.void(target, at, source, begin, a), _add_code
+
+
+@intrinsic
+def _solve(typingctx, vector, first, second, a, b, c):  # type: ignore[no-untyped-def]
+    return types.void(vector, first, second, a, b, c), _solve_code
+
+
+_eliminate_quad: Any = _eliminate
+_add_quad: Any = _add
+_solve_quad: Any = _solve
 
 
 @overload(eliminate_quad, inline="always")
-def _overload(vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
+def _overload_eliminate(vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
     return lambda vector, first, second, one, two, a, b, c, d: _eliminate_quad(
         vector, first, second, one, two, a, b, c, d
     )
+
+
+@overload(add_quad, inline="always")
+def _overload_add(target, at, source, begin, a):  # type: ignore[no-untyped-def]
+    return lambda target, at, source, begin, a: _add_quad(target, at, source, begin, a)
+
+
+@overload(solve_quad, inline="always")
+def _overload_solve(vector, first, second, a, b, c):  # type: ignore[no-untyped-def]
+    return lambda vector, first, second, a, b, c: _solve_quad(vector, first, second, a, b, c)
 
 
 @inline

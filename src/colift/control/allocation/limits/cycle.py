@@ -81,6 +81,8 @@ SLIGHT = 1e-3
 """Largest part of the cost that is left then."""
 DRIFT = 4.0
 """Of a residual, a step with the matrix of the step before leaves the relative change of the limits times this."""
+CHEAP = 2
+"""Steps with the matrix of the step before that cost no more than one with its own."""
 RETRY = 0.5
 """Work of a step whose matrix had to be shifted and built again, in steps: it ends there."""
 RETRIES = 8
@@ -446,7 +448,7 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
         # How much a step with the same matrix leaves: of barriers as of the change of their limits.
         left = min(DRIFT * drift, 1.0)
         # A full step leaves what it began with times that change, nearly.
-        if settled and (again or origin * drift * left <= tolerance):
+        if settled and (again or origin * drift * left**CHEAP <= tolerance):
             known = True
             residual = newton.gradient(n, limits, caps, m, weights, work)
             if residual <= tolerance:
@@ -454,10 +456,9 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
                 break
             if iterations + RETRY * failed >= max_iterations:
                 break
-            good = (
-                residual * residual <= tolerance * origin if again else residual * left <= tolerance
-            )
-            again = good and attempts == 0 and s == 1.0
+            if again:
+                left = residual / origin
+            again = residual * left**CHEAP <= tolerance and attempts == 0 and s == 1.0
         else:
             known = again = False
         if not again:

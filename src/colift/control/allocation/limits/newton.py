@@ -52,7 +52,7 @@ from typing import Any, NamedTuple
 
 from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
-from colift.kernel.math.vectors import eliminate
+from colift.kernel.math.vectors import QUAD, add_quad, eliminate, solve_quad
 
 TENSION_MAX, TENSION_MIN, CONE, RATE, THRUST, TILT = range(6)
 LIMITS = 6
@@ -78,7 +78,8 @@ DENSE = 8
 STRONG = 0.004
 """Stiffness of a pair over that of the proximal term from which on it is strong."""
 
-SYSTEM = 8 * 8 + 8
+SYSTEM = 8 * 8 + 8 + 8
+"""The system of eight, its right-hand side, and that after elimination."""
 
 
 class Work(NamedTuple):
@@ -614,9 +615,15 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
             lj = tj + size
             s00, s01 = K[top + 2 * j], K[top + 2 * j + 1]
             s10, s11 = K[low + 2 * j], K[low + 2 * j + 1]
-            for k in range(2 * int(max(first[i], first[j])), 2 * j):
+            for k in range(2 * int(max(first[i], first[j])), 2 * j, 2):
                 x0, x1 = K[top + k], K[low + k]
                 y0, y1 = K[tj + k], K[lj + k]
+                s00 -= x0 * y0
+                s01 -= x0 * y1
+                s10 -= x1 * y0
+                s11 -= x1 * y1
+                x0, x1 = K[top + k + 1], K[low + k + 1]
+                y0, y1 = K[tj + k + 1], K[lj + k + 1]
                 s00 -= x0 * y0
                 s01 -= x0 * y1
                 s10 -= x1 * y0
@@ -637,9 +644,7 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
             c11 -= s10 * s10 + s11 * s11
             q0 = PITCH * 2 * j
             q1 = q0 + PITCH
-            for k in range(RHS):
-                Y[k0 + k] -= s00 * Y[q0 + k] + s01 * Y[q1 + k]
-                Y[k1 + k] -= s10 * Y[q0 + k] + s11 * Y[q1 + k]
+            eliminate(Y, PITCH, k0, k1, q0, q1, s00, s01, s10, s11)
         if not c00 > 1e-10:
             return False
         i0 = 1.0 / math.sqrt(c00)
@@ -651,9 +656,8 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
         K[top + 2 * i] = i0
         K[low + 2 * i] = l10
         K[low + 2 * i + 1] = i1
-        for k in range(RHS):
-            Y[k0 + k] *= i0
-            Y[k1 + k] = (Y[k1 + k] - l10 * Y[k0 + k]) * i1
+        for k in range(0, PITCH, QUAD):
+            solve_quad(Y, k0 + k, k1 + k, i0, l10, i1)
     return True
 
 
@@ -692,15 +696,14 @@ def factor_columns(n, shift, work):  # type: ignore[no-untyped-def]
             K[c + r] *= i0
             K[s + r] = (K[s + r] - l10 * K[c + r]) * i1
         K[c], K[c + 1], K[s + 1] = i0, l10, i1
-        for k in range(RHS):
-            Y[y0 + k] *= i0
-            Y[y1 + k] = (Y[y1 + k] - l10 * Y[y0 + k]) * i1
+        for k in range(0, PITCH, QUAD):
+            solve_quad(Y, y0 + k, y1 + k, i0, l10, i1)
     return True
 
 
 @inline
 def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
-    """Lower triangle and right-hand side (row 8) of the 8x8 system, ``(rx, ry, rz) = sum w + F``."""
+    """The 8x8 system and its right-hand side (row 8), ``(rx, ry, rz) = sum w + F``."""
     alpha, rows, Y, S = work.alpha, work.rows, work.Y, work.S
     for k in range(SYSTEM):
         S[k] = 0.0
@@ -722,51 +725,13 @@ def reduced_system(n, rx, ry, rz, work):  # type: ignore[no-untyped-def]
         S[69] -= part * x
         S[70] -= part * y
         S[71] -= part * z
-    # A few sums at a time, as many as fit into registers.
-    a00 = a10 = a11 = a20 = a21 = a22 = a30 = a31 = a32 = a33 = a40 = a41 = a42 = a43 = a44 = 0.0
+    # U K^-1 U^T whole, as its rows are the columns that the elimination needs.
     for r in range(0, 2 * PITCH * n, PITCH):
-        y0, y1, y2, y3, y4 = Y[r], Y[r + 1], Y[r + 2], Y[r + 3], Y[r + 4]
-        a00 += y0 * y0
-        a10 += y1 * y0
-        a11 += y1 * y1
-        a20 += y2 * y0
-        a21 += y2 * y1
-        a22 += y2 * y2
-        a30 += y3 * y0
-        a31 += y3 * y1
-        a32 += y3 * y2
-        a33 += y3 * y3
-        a40 += y4 * y0
-        a41 += y4 * y1
-        a42 += y4 * y2
-        a43 += y4 * y3
-        a44 += y4 * y4
-    S[0] += a00
-    S[8], S[9] = a10, S[9] + a11
-    S[16], S[17], S[18] = a20, a21, S[18] + a22
-    S[24], S[25], S[26], S[27] = a30, a31, a32, S[27] + a33
-    S[32], S[33], S[34], S[35], S[36] = a40, a41, a42, a43, S[36] + a44
-    for k in range(5, 9):
-        a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = 0.0
-        for r in range(0, 2 * PITCH * n, PITCH):
-            y = Y[r + k]
-            a0 += y * Y[r]
-            a1 += y * Y[r + 1]
-            a2 += y * Y[r + 2]
-            a3 += y * Y[r + 3]
-            a4 += y * Y[r + 4]
-            a5 += y * Y[r + 5]
-            a6 += y * Y[r + 6]
-            a7 += y * Y[r + 7]
-        sign = -1.0 if k == 8 else 1.0
-        S[8 * k] += sign * a0
-        S[8 * k + 1] += sign * a1
-        S[8 * k + 2] += sign * a2
-        S[8 * k + 3] += sign * a3
-        S[8 * k + 4] += sign * a4
-        S[8 * k + 5] += sign * a5
-        S[8 * k + 6] += sign * a6
-        S[8 * k + 7] += sign * a7
+        for k in range(8):
+            add_quad(S, 8 * k, Y, r, Y[r + k])
+            add_quad(S, 8 * k + 4, Y, r + 4, Y[r + k])
+        add_quad(S, 64, Y, r, -Y[r + 8])
+        add_quad(S, 68, Y, r + 4, -Y[r + 8])
 
 
 @inline
@@ -800,11 +765,14 @@ def multiplier(S, bound_h, bound_v, again):  # type: ignore[no-untyped-def]
     """
     for k in range(5):
         inverse = S[9 * k] if again else 1.0 / S[9 * k]
-        S[9 * k] = inverse
+        f = 0.0
         for r in range(8 if again else k + 1, 9):
             f = S[8 * r + k] * inverse
-            for c in range(k + 1, min(r + 1, 8)):
-                S[8 * r + c] -= f * S[8 * c + k]
+            if k < 4:
+                add_quad(S, 8 * r, S, 8 * k, -f)
+            add_quad(S, 8 * r + 4, S, 8 * k + 4, -f)
+        S[9 * k] = inverse
+        S[72 + k] = f
     a, b, c = S[45], S[53], S[54]
     d, e, f = S[61], S[62], S[63]
     x, y, z = S[69], S[70], S[71]
@@ -827,10 +795,10 @@ def multiplier(S, bound_h, bound_v, again):  # type: ignore[no-untyped-def]
     S[70] = ly
     S[71] = lz
     for k in range(4, -1, -1):
-        value = S[64 + k]
+        value = 0.0
         for m in range(k + 1, 8):
-            value -= S[8 * m + k] * S[64 + m]
-        S[64 + k] = value * S[9 * k]
+            value += S[8 * k + m] * S[64 + m]
+        S[64 + k] = S[72 + k] - value * S[9 * k]
     return active
 
 
