@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 
 import pytest
 
@@ -17,6 +18,17 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         return
     # What fails here fails in a test, with its reason.
     subprocess.run([sys.executable, "-m", "colift", "compile"], stdout=subprocess.DEVNULL)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _parts_of_the_module() -> Iterator[None]:
+    """What the tests of a module register is gone for those of the next."""
+    from colift import part
+
+    before = dict(part._registered)
+    yield
+    part._registered.clear()
+    part._registered.update(before)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
