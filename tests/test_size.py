@@ -265,7 +265,7 @@ def test_the_pages_show_what_the_command_prints(monkeypatch: pytest.MonkeyPatch)
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     kept = json.loads((figures / "size.json").read_text(encoding="utf-8"))
-    assert kept.keys() == script.QUESTIONS.keys()
+    assert kept.keys() == (script.QUESTIONS | script.RIGID).keys()
     for name in ("carries", "how-many"):
         assert script.ask(script.QUESTIONS[name]) == kept[name]
 

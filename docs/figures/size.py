@@ -12,6 +12,7 @@ QUESTIONS = {
     "how-many": "--mass 1.4 --max-thrust 28 --cable 2 --load 5",
     "lost": "--vehicle x500 --drones 4 --cable 2 --load 1.5 --wind 6 --fly --seeds 10",
 }
+RIGID = {"box": "--vehicle x500 --load 2 --box 0.8 0.6 0.3"}
 SHORT = {"how-many": ("Fewest", "How long"), "lost": ("1.5 kg", "Fewest")}
 """Of what the front page shows less, from a line that begins so to the one before another."""
 WIDTH = 100
@@ -43,9 +44,13 @@ def shown(arguments, lines):
 
 
 def main():
-    answers = stored(__file__, lambda: {name: ask(each) for name, each in QUESTIONS.items()})
+    answers = stored(
+        __file__, lambda: {name: ask(each) for name, each in (QUESTIONS | RIGID).items()}
+    )
     for name, question in QUESTIONS.items():
         fill("your-drones.md", name, shown(question, answers[name]))
+    for name, question in RIGID.items():
+        fill("rigid-loads.md", name, shown(question, answers[name]))
     parts = []
     for name, question in QUESTIONS.items():
         lines = answers[name]

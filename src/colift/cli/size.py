@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,7 @@ from colift.errors import MissionError, Problem
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from colift.study import rigid_size
     from colift.study.size import Answer, Flown, Judgement, Most, Question
 
 Name = Annotated[
@@ -41,6 +43,10 @@ Drones = Annotated[
 ]
 Cable = Annotated[float | None, typer.Option(help="Length of each cable, m.", show_default="1")]
 Load = Annotated[float | None, typer.Option(help="Load, kg.", show_default="the heaviest")]
+Box = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(help="Edges of a rigid load's box, m.", show_default="a point, or the mission's"),
+]
 Wind = Annotated[
     float | None,
     typer.Option(
@@ -71,6 +77,7 @@ def size(
     drones: Drones = None,
     cable: Cable = None,
     load: Load = None,
+    box: Box = None,
     wind: Wind = None,
     at_most: AtMost = 12,
     mass: Mass = None,
@@ -91,13 +98,15 @@ def size(
     """How much these drones carry, how many a load takes, for how long, and what if one is lost.
 
     Judged by optimisation, in calm air and in the wind, with all drones and with the worst one lost and the others planned
-    anew; with --fly also flown. Exit code 1 if the load (or, without one, any load) is not carried.
+    anew; with --fly also flown. A rigid load is judged as colift run judges it, with its cables attached in several ways. Exit code
+    1 if the load (or, without one, any load) is not carried.
 
     [bold]Examples[/bold]
 
       colift size --mass 1.4 --max-thrust 28 --drones 3 --cable 2 --load 1.2 --wind 8
       colift size --mass 1.4 --max-thrust 28 --cable 2 --load 5
       colift size --vehicle x500 --drones 4 --cable 2 --fly
+      colift size --vehicle x500 --load 2 --box 0.8 0.6 0.3
       colift size my-mission.toml
     """
     from colift.mission.load import parse_overrides
@@ -121,7 +130,14 @@ def size(
             source, wind = {**study.BASE, "drones": numbers}, wind or 0.0
         else:
             changes = {f"drones.{name}": value for name, value in numbers.items()} | changes
+        if box is not None:
+            changes = {"load.kind": "rigid", "load.size": list(box)} | changes
         question = study.Question(source, changes, drones, load, wind, at_most)
+        rigid = question.mission(drones).team.body is not None
+    if rigid:
+        _size_rigid(question, flown=flown, as_json=as_json)
+        return
+    with loading():
         answer = study.size(question)
     flights: list[Flown] = []
     if flown and (answer.held.ok or answer.asked is not None):
@@ -135,6 +151,77 @@ def size(
         show_notes(notes)
     if not answer.ok:
         raise typer.Exit(EXIT_ERROR)
+
+
+def _size_rigid(question: Question, *, flown: bool, as_json: bool) -> None:
+    """Answer for a load with an attitude."""
+    from colift.study import rigid_size
+
+    if flown:
+        message = "is for point loads: fly a rigid one with colift stress or colift campaign"
+        raise MissionError("size", [Problem("--fly", "", message)])
+    with loading(), progress("Judging") as advance:
+        seen = itertools.count(1)
+        # How many there will be nobody knows: the bar nears its end and does not pass it.
+        answer = rigid_size.size(question, lambda: advance(1.0 - math.exp(-next(seen) / 150.0)))
+    if as_json:
+        emit(rigid_size.as_json(question, answer))
+    else:
+        _say_rigid(question, answer)
+    if not answer.ok:
+        raise typer.Exit(EXIT_ERROR)
+
+
+def _say_rigid(question: Question, answer: rigid_size.Answer) -> None:
+    from colift.study import rigid_size
+
+    team, n = answer.mission.team, answer.mission.team.n
+    edges = " x ".join(f"{edge:g}" for edge in answer.mission.load.size or ())
+    out.print(
+        f"{n} drones of {_range(team.masses)} kg with {_range(answer.limits)} N each, cables of "
+        f"{_range(team.cable_lengths)} m, a load of {edges} m that flies {answer.mission.kinds['reference']}",
+        highlight=False,
+    )
+
+    def carried(load: float) -> str:
+        return "none" if load == 0.0 else f"{load:.2f} kg"
+
+    def many(found: int | None) -> str:
+        return "-" if answer.asked is None else str(found or f"more than {question.at_most}")
+
+    rows = [
+        [
+            name, carried(each.most.load), carried(each.most_spare.load),
+            *(["-", "-"] if name == rigid_size.AS_GIVEN else [many(each.few), many(each.few_spare)]),
+        ]
+        for name, each in answer.places.items()
+    ]  # fmt: skip
+    head = ["cables end", "carried", "with any one lost", "fewest drones", "if one may be lost"]
+    show_tables([("Heaviest load, and drones for the one that is asked", head, rows)])
+    limits: dict[str, list[str]] = {}
+    for name, each in answer.places.items():
+        for found, who in ((each.most, ""), (each.most_spare, ", one lost")):
+            limits.setdefault(found.why, []).append(name + who)
+    for why, where in limits.items():
+        out.print(f"More, {'; '.join(where)}: {escape(why)}", highlight=False)
+    _say_held(answer)
+
+
+def _say_held(answer: rigid_size.Answer) -> None:
+    """How the load is held, with all drones and without each of them."""
+    load, first = answer.mission.team.load_mass, next(iter(answer.places))
+    if not answer.held.ok:
+        out.print(f"{load:.4g} kg: {escape(answer.held.problem)}", highlight=False)
+        return
+    i = int((answer.thrusts / answer.limits).argmax())
+    out.print(
+        f"{load:.4g} kg, cables end {first}: pulls of {_range(answer.tensions)} N, at most {answer.thrusts[i]:.3g} of {answer.limits[i]:.3g} N of thrust"
+        + (f"; cables from {answer.shortest:.2g} m on will do" if answer.shortest else ""),
+        highlight=False,
+    )
+    for drone, why in answer.held.losses.items():
+        said = f"comes down: {why}" if why else str(answer.held.leaning[drone])
+        out.print(f"  without drone {drone}: {escape(said)}", highlight=False)
 
 
 RANGES = {"--drones": (1, 64), "--wind": (0, 60), "--at-most": (1, 64), "--seeds": (1, 10_000)}
@@ -283,5 +370,5 @@ def _minutes(seconds: float) -> str:
 
 
 def _range(values: Any) -> str:
-    low, high = float(min(values)), float(max(values))
-    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+    low, high = f"{float(min(values)):.4g}", f"{float(max(values)):.4g}"
+    return low if low == high else f"{low} to {high}"

@@ -249,7 +249,8 @@ def hover_checks(
             yield Problem(path, value, message)
         else:
             limits = ", ".join(allocation.binding(team, actuation))
-            yield Problem("allocation", "", f"{message}; what limits: {limits}")
+            told = f"; what limits: {limits}" if limits else ""
+            yield Problem("allocation", "", message + told)
 
 
 def _criteria_checks(frame: Frame) -> Iterable[Problem]:

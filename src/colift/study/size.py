@@ -31,6 +31,7 @@ from colift.kernel.math import shares
 from colift.mission.forecast import forecast
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
+from colift.part import Part
 from colift.record import metrics
 from colift.record.recording import Recording
 from colift.study.campaign.plan import varied
@@ -103,6 +104,17 @@ class Judgement:
     lean: float
 
 
+def are_alike(team: Team, parts: Iterable[Part]) -> bool:
+    """Whether all drones of a team are the same, and treated the same."""
+    arrays = (getattr(team, name) for name, value in vars(team).items() if np.ndim(value) > 0)
+    same = all(
+        np.array_equal(each, each[:1].repeat(team.n, axis=0), equal_nan=True) for each in arrays
+    )
+    return same and not any(
+        isinstance(getattr(part, name), list) for part in parts for name in part.per_drone
+    )
+
+
 @dataclass(frozen=True)
 class Crew:
     """A team with all that decides what it carries; settings that were left to the team follow it and its load."""
@@ -160,15 +172,7 @@ class Crew:
     @property
     def alike(self) -> bool:
         """Whether all drones are the same."""
-        team = self.team
-        arrays = (getattr(team, name) for name, value in vars(team).items() if np.ndim(value) > 0)
-        same = all(
-            np.array_equal(each, each[:1].repeat(team.n, axis=0), equal_nan=True) for each in arrays
-        )
-        parts = (self.allocation, self.actuation, *self.disturbances)
-        return same and not any(
-            isinstance(getattr(part, name), list) for part in parts for name in part.per_drone
-        )
+        return are_alike(self.team, (self.allocation, self.actuation, *self.disturbances))
 
     def left(self) -> list[tuple[int, Crew]]:
         """Who may be lost, and the others; one of drones that are all alike."""

@@ -160,3 +160,15 @@ def usual_attachments(n: int, size: Array) -> Array:
         return np.array([[x, y, z], [-x, y, z], [-x, -y, z], [x, -y, z]])
     angles = 2.0 * math.pi * np.arange(n) / n
     return np.column_stack([x * np.cos(angles), y * np.sin(angles), np.full(n, z)])
+
+
+def edge_attachments(n: int, size: Array, first: float) -> Array:
+    """Ends (n, 3) on the edges of a box's upper face, m, at equal angles of the ellipse within them from ``first`` on, rad.
+
+    Each goes straight out from the ellipse to the edge: four from 45 degrees on are the corners, eight the corners and the middles of all edges.
+    """
+    x, y, z = 0.5 * np.asarray(size, dtype=float)
+    angles = first + 2.0 * math.pi * np.arange(n) / n
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    ring /= np.abs(ring).max(axis=1, keepdims=True)
+    return np.column_stack([x * ring[:, 0], y * ring[:, 1], np.full(n, z)])
