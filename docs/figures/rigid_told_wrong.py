@@ -11,7 +11,7 @@ from colift.mission import load_mission
 from colift.record import metrics
 
 SEEDS = range(73_000, 73_010)
-LAWS = ("pose", "pose-adaptive")
+LAWS = ("pose", "pose-robust", "pose-adaptive")
 WRONG = {
     "nothing": {},
     "centre of mass 3 cm along": {"truth.centre_of_mass_offset": [0.03, 0.0, 0.0]},
@@ -20,6 +20,13 @@ WRONG = {
     "mass, by a fifth": {"truth.load_mass_factor": 1.2},
     "inertia, by a half": {"truth.load_inertia_factor": 1.5},
     "attachments, by 1 cm": {},
+    "wind of 5 m/s, turbulent": {
+        "disturbance": [
+            {"kind": "wind", "speed": 5.0},
+            {"kind": "dryden", "speed": 5.0},
+            {"kind": "drag"},
+        ]
+    },
 }
 CALM = {
     "reference.period": 7.0,
