@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from colift.control.estimation import _pose
 from colift.control.estimation._cables import load_from_drones
 from colift.control.estimation.base import SIGNATURE, EstimationPart
 from colift.control.margins import Filter
@@ -20,8 +21,11 @@ from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.ages import newer
 from colift.kernel.math.smooth import decay
+from colift.kernel.spans import LINE, POINT
 from colift.part import Declared, Setup, Vector
 from colift.team import Team
+from colift.team.geometry import matrix_of
+from colift.team.plan import plan, spanned
 
 FINEST = 0.5e-3
 """The forecast remembers one acceleration for every so many seconds of the delay, s."""
@@ -29,29 +33,36 @@ FINEST = 0.5e-3
 SPARE = 0.02
 """By so much more than is told samples may be late, s; or by as much again, where that is more."""
 
+SETTLED = 20.0
+"""Time in which the filter of a rigid load settles, s, where it does."""
+FAR, TURNED = 0.05, math.radians(5.0)
+"""Deviations of a place, m, and turn, rad, from which on it counts as unknown."""
+
 FILTER = Layout(team={"gain": 6, "gate": 2})
 """Gain by state (3) and measurement (2); the most that a measurement may surprise with."""
 PARAMS = Layout(
     team={
         "delay": 1, "turn": 1, "lag": 1, "period": 1, "patience": 1, "smooth": 1, "g": 1, "m_L": 1,
         "steady": 1, "coast": 1, "load": FILTER.size(0), "drones": FILTER.size(0), "room": 1,
-        "slots": 1, "stamped": 1,
+        "slots": 1, "stamped": 1, "rigid": 1, "body": _pose.BODY.size(0),
     },
-    drone={"m": 1, "L": 1},
+    drone={"m": 1, "L": 1, "arm": 3},
 )  # fmt: skip
 """``turn``: age of the attitudes; ``room``: accelerations of the told delay, of ``slots`` that a body's ring
-has; whether samples are ``stamped``."""
+has; whether samples are ``stamped``, and the load has an attitude; ``arm``: of a cable's end, from its centre of mass."""
 BODY = Layout(
     team={
         "started": 1, "waited": 1, "age": 1, "sample": 6, "state": 9, "attitude": 4,
-        "attitude_age": 1, "since": 1, "thrust": 1, "places": 1, "ring": None,
+        "attitude_age": 1, "since": 1, "thrust": 1, "places": 1, "cable": _pose.CABLE.size(0), "ring": None,
     }
 )  # fmt: skip
 """Time ``waited`` since the last ``sample`` came, and its ``age``; ``state`` when it was taken: position, velocity, unexplained
 acceleration; age of the last measured attitude, and time ``since`` it came; ``thrust`` that acts; ``places``: of the ring, from the state's time to now; ``ring`` of known
 accelerations."""
-MEMORY = Layout(team={"load": None}, drone={"body": None})
+MEMORY = Layout(team={"load": None, "pose": _pose.POSE.size(0)}, drone={"body": None})
 P, F, B = PARAMS.at, FILTER.at, BODY.at
+POSE = _pose.POSE.size(0)
+ALIVE = _pose.M.alive
 
 
 @inline
@@ -176,6 +187,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     room = int(params[P.room])
     slots = int(params[P.slots])
     width = B.ring + 3 * slots
+    first = width + POSE  # the load and its pose come first
     steps = round(params[P.delay] / dt)
     stride = max((steps + room - 1) // room, 1)
     if step % stride != 0:
@@ -190,7 +202,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     keep = decay(dt, params[P.lag])
     px = py = pz = 0.0
     for i in range(n):
-        o = width * (1 + i)  # the load comes first
+        o = first + width * i
         m = params[P.rows + P.width * i + P.m]
         if memory[o + B.started] == 0.0:
             memory[o + B.thrust] = thrusts[i]
@@ -243,15 +255,32 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     tracked = _sampled(
         0, 0, measured_ages[n, 0], params[P.period], dt, memory, load[0:1], load[1:2]
     )
+    if tracked and memory[width + ALIVE] != 0.0:  # heard of again
+        memory[B.started] = 0.0
+        _start(0, 0, load[0:1], load[1:2], memory)
+        for k in range(3):
+            memory[B.state + 6 + k] = 0.0
     moves = _moves(0, tracked, slots, dt, params, memory)
     _advance(0, slot, slots, moves, dt, -px / m_L, -py / m_L, -pz / m_L - g, memory)
     s = B.state
-    if not tracked and memory[B.waited] > params[P.patience] + params[P.period]:
+    silent = not tracked and memory[B.waited] > params[P.patience] + params[P.period]
+    if params[P.rigid] != 0.0 and (silent or params[P.patience] < 0.0):
+        rows = _pose.Rows(
+            P.width, width, P.rows + P.arm, P.rows + P.L, P.rows + P.m, B.thrust, B.cable
+        )
+        _pose.follow(
+            width, first, n, dt, params[P.period], params[P.patience] >= 0.0, m_L, g, P.body, rows, params, sees, memory,
+            writes,
+        )  # fmt: skip
+        ages[n, 0] = 0.0
+        return
+    memory[width + ALIVE] = 0.0
+    if silent:
         guess = (
             memory[s], memory[s + 1], memory[s + 2], memory[s + 3], memory[s + 4], memory[s + 5]
         )  # fmt: skip
         found = load_from_drones(
-            n, width + s, width, memory, P.rows + P.L, P.width, params, sees.reeled,
+            n, first + s, width, memory, P.rows + P.L, P.width, params, sees.reeled,
             sees.found_lengths, guess,
         )  # fmt: skip
         for k in range(6):
@@ -299,6 +328,12 @@ def steady_gains(
         P = 0.5 * (after + after.T)
 
 
+def _axis(axis: Vector) -> str:
+    """An axis in words, of its two senses that with the larger part above zero."""
+    up = axis * np.sign(axis[np.abs(axis).argmax()])
+    return f"({', '.join(f'{each:.2g}' for each in up.round(6) + 0.0)})"
+
+
 Noise = Annotated[float, Field(gt=0.0, le=10.0)]
 
 
@@ -313,7 +348,8 @@ class Predictor(EstimationPart):
     How late a sample is it says itself, by the time at which it was taken: so a delay that is told wrongly is found with the first
     samples, in hover too, where commands and answers have nothing to be correlated.
 
-    Without a load measurement for ``patience`` the load is found from the drones and their cables' lengths. A
+    Without a load measurement for ``patience`` the load is found from the drones and their cables' lengths; the pose of a rigid load also from
+    the pulls that drones feel, and the laws of its motion (docs/theory/control.md). A
     drone without measurements is carried forward for ``coast``.
     """
 
@@ -354,7 +390,7 @@ class Predictor(EstimationPart):
     load_from: Literal["sensor", "cables"] = "sensor"
     """Where the load is known from: its own tracking as long as there is some, or the drones alone."""
     patience: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
-    """How long the load's sensor may be silent before the drones fill in, s; a rigid load is carried forward instead."""
+    """How long the load's sensor may be silent before the drones fill in, s."""
     coast: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
     """How long a drone is carried forward without any new sample, s; then it is left standing, for a detection to see."""
     steady: Annotated[float, Field(ge=0.0, le=1.0)] = 0.01
@@ -368,23 +404,72 @@ class Predictor(EstimationPart):
         yield from shorter("attitude_delay", self.attitude_delay, "sensing.attitude_delay", real)
         yield from lag_warnings(self.lag, mission)
 
+        if mission.team.body is not None and self.load_from == "cables":
+            for unknown in self.unseen(mission.team):
+                yield "load_from", unknown
+
     def check(self, team: Team) -> list[tuple[str, str]]:
-        if team.body is not None and self.load_from == "cables":
-            return [
-                ("load_from", "takes cables that meet in a point: a rigid load needs its sensor")
-            ]
+        if team.body is not None and self.load_from == "cables" and spanned(team)[0] == POINT:
+            message = (
+                "takes cables that end in two points at least for the attitude of a rigid load"
+            )
+            return [("load_from", message)]
         return super().check(team)
+
+    def unseen(self, team: Team) -> list[str]:
+        """What drones and cables alone leave unknown of a rigid load's pose in hover."""
+        covariance, (kind, axis) = self.covariance(team), spanned(team)
+        found = []
+        if kind == LINE:
+            found.append(
+                f"leaves the load's turn about {_axis(axis)} of its frame to the laws of motion alone: that is the line through the ends of its "
+                "cables, which turns about it do not move"
+            )
+        for name, begin, most, unit in (("place", 0, FAR, "m"), ("turn", 3, TURNED, "rad")):
+            sizes, axes = np.linalg.eigh(covariance[begin : begin + 3, begin : begin + 3])
+            for size, each in zip(np.sqrt(sizes), axes.T, strict=True):
+                if not size < most:
+                    found.append(
+                        f"leaves the load's {name} {'along' if name == 'place' else 'about'} {_axis(each)} of its frame unknown: drones and cables "
+                        f"alone tell it to {size:.2g} {unit}, more than {most:.2g}"
+                    )
+        return found
+
+    def covariance(self, team: Team) -> Vector:
+        """Of the errors of place, m, and turn, rad, (6, 6) in the load's frame, once the filter of a rigid load has settled in hover."""
+        directions, tensions = plan(team)
+        assert team.body is not None
+        hang = matrix_of(team.body.hang)
+        ends = team.body.attachments @ hang.T
+        part = self.model_copy(update={"load_from": "cables"})
+        memory = part.memory(team)
+        seen: dict[str, Any] = {
+            "measured_attitudes": np.tile([1.0, 0.0, 0.0, 0.0], (team.n, 1)),
+            "measured_positions": ends - team.cable_lengths[:, None] * directions,
+            "measured_specific_forces": (tensions / team.masses)[:, None] * directions,
+            "received_tensions": tensions, "received_directions": directions,
+        }  # fmt: skip
+        for step in range(round(SETTLED / self.period)):
+            part.call(team, memory, step=step, dt=self.period, **seen)
+        begin = B.ring + 3 * self._slots + _pose.M.P
+        size = _pose.STATE
+        whole = memory[begin : begin + size * size].reshape(size, size)
+        return np.array(whole[:6, :6])
 
     def params(self, team: Team) -> Vector:
         patience = self.patience if self.load_from == "sensor" else -1.0
-        if team.body is not None:  # its cables do not meet
-            patience = math.inf
+        body = np.zeros(_pose.BODY.size(0))
+        if team.body is not None:
+            J = team.body.inertia
+            body = _pose.BODY.pack(
+                0, J=J.ravel(), inverse=np.linalg.inv(J).ravel(), centre=team.body.centre
+            )
         return PARAMS.pack(
             team.n, delay=self.delay, turn=self.attitude_delay, lag=self.lag, period=self.period,
             patience=patience, smooth=self.attitude_filter, g=team.gravity, m_L=team.load_mass,
             steady=self.steady, coast=self.coast, room=self._room, slots=self._slots,
             stamped=float(self.delay_from == "stamps"), m=team.masses,
-            L=team.cable_lengths,
+            L=team.cable_lengths, arm=team.levers, rigid=float(team.body is not None), body=body,
             load=self._filter(self.load_position_noise, self.load_velocity_noise),
             drones=self._filter(self.position_noise, self.velocity_noise),
         )  # fmt: skip
