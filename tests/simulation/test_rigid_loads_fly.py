@@ -179,6 +179,25 @@ def test_the_moment_that_an_allocator_leaves_out_is_recorded() -> None:
     assert metrics.compute(recording)["max_missing_moment_Nm"] == known.max() > 0.01
 
 
+@pytest.mark.parametrize(("n", "period"), [(3, 6.4), (4, 5.4), (6, 6.4)])
+def test_at_100_Hz_no_error_follows_what_the_load_is_wanted_to_do(n: int, period: float) -> None:
+    """What is held for a period acts as late as it was led, and is observed as late: whatever is half a period off shows as an error in proportion to the motion."""
+    layers = ("load_control", "allocation", "position_control", "attitude_control")
+    slow = {f"timing.{name}": 0.01 for name in layers}
+    slow |= {"drones.count": n, "reference.period": period, "seed": 3}
+    recording = Flight(load_mission("box-figure-eight", slow)).run()
+    when = recording.time >= 6.0
+    errors, wanted = metrics.tracking_error(recording)[when], recording["reference"][when]
+    assert float(np.sqrt(np.mean(np.sum(errors**2, axis=1)))) < 0.002
+    for k in range(2):
+        slopes, *_ = np.linalg.lstsq(wanted[:, 1:, k], errors[:, k], rcond=None)
+        assert abs(slopes[1]) < 0.0005  # m per m/s^2
+    late = {**slow, "sensing.kind": "noisy", "timing.delay": 0.02}
+    recording = Flight(load_mission("box-figure-eight", late)).run()
+    errors = metrics.tracking_error(recording)[recording.time >= 6.0]
+    assert float(np.sqrt(np.mean(np.sum(errors**2, axis=1)))) < 0.0035
+
+
 def test_how_often_the_allocator_answers_is_all_but_the_same_to_a_load() -> None:
     """What passes to the drones without a filter is free of the steps of answers that are held."""
     errors = []
@@ -311,7 +330,6 @@ def test_an_attitude_that_nobody_can_hold_is_warned_of_and_judged() -> None:
         ({"load": {"kind": "rigid", "size": [1.0, 0.0, 0.0]}}, r"load\.inertia.*without width"),
         ({"load": {**BOX["load"], "inertia": [1.0, 1.0, 3.0]}}, "none exceeds the sum"),
         ({"load": {**BOX["load"], "attachments": [[0.0, 0.0, 0.0]] * 3}}, "attachments"),
-        ({"estimation": {"kind": "predictor", "load_from": "cables"}}, "needs its sensor"),
     ],
 )
 def test_what_a_rigid_load_cannot_fly_with_is_refused(change: dict[str, Any], says: str) -> None:

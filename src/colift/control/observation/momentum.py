@@ -22,11 +22,12 @@ from colift.team import Team
 PARAMS = Layout(
     team={
         "g": 1, "m_L": 1, "total": 1, "own": 1, "limit": 1, "lag": 1, "delay": 1, "breeze": 1,
-        "rotors": 1, "learn": 1, "doubt": 1,
+        "rotors": 1, "learn": 1, "doubt": 1, "middle": 1,
     },
     drone={"m": 1, "drag": 1, "L": 1},
 )  # fmt: skip
-"""Bandwidths of the observers of the ``total`` momentum and of each drone's ``own``, 1/s; ``limit`` over weight."""
+"""Bandwidths of the observers of the ``total`` momentum and of each drone's ``own``, 1/s; ``limit`` over weight;
+``middle``: by how much of a period before its end what acts in it is taken."""
 MEMORY = Layout(
     team={"started": 1, "momentum": 3, "common": 3, "wind": 3, "led": 1},
     drone={
@@ -50,6 +51,9 @@ PROMPT = 0.05
 """Time constant of the tension by which that is judged, s."""
 STEADY = 0.1
 """Speed at which the ends of a taut cable may seem to part, m/s."""
+MIDDLE = 0.5
+"""Of a rigid load, whose thrusts are led by half a period so that they are right on average: there what has acted in a period is that of its middle. Of a
+point they are not, act as much later, and are observed as late: a correction of half of it would be a force on the load."""
 FIRST = 0.05
 """Time over which a length is known by before it is used, s."""
 
@@ -176,12 +180,15 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 memory[o + M.own + k] = m * v[i, k]
                 memory[M.momentum + k] += m * v[i, k]
         else:
-            thrust = lag * memory[o + M.thrust] + (1.0 - lag) * thrusts[i]
+            before, middle = memory[o + M.thrust], params[P.middle]
+            thrust = lag * before + (1.0 - lag) * thrusts[i]
             memory[o + M.thrust] = thrust
+            thrust += middle * (before - thrust)
             drag = params[P.rows + P.width * i + P.drag]
             pull_of_wind += drag * thrust
             breeze = memory[M.wind : M.wind + 3]
-            force = rotors.force_of(i, thrust, q, Omega, delay, drag, breeze, v)
+            age = delay - middle * dt
+            force = rotors.force_of(i, thrust, q, Omega, age, drag, breeze, v)
             for k in range(3):
                 known = force[k] - (m * g if k == 2 else 0.0)
                 memory[M.momentum + k] += dt * known
@@ -319,4 +326,5 @@ class Momentum(ObservationPart, Delays):
             breeze=self.breeze * velocity, rotors=self.rotors, limit=self.limit, lag=self.lag,
             delay=self.delay if self.predicted else 0.0, m=team.masses,
             learn=self.learning, doubt=self.length_doubt, L=team.cable_lengths,
+            middle=MIDDLE if team.body is not None else 0.0,
         )  # fmt: skip

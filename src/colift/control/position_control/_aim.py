@@ -113,11 +113,12 @@ AHEAD = 9
 
 
 @inline
-def look_ahead(i, fresh, dt, keep, lag, p, memory, o, u, attitudes, turning):  # type: ignore[no-untyped-def]
+def look_ahead(i, fresh, dt, keep, lag, p, memory, o, attitudes, turning):  # type: ignore[no-untyped-def]
     """What the thrust vector ``p`` (3,) that is planned of drone i, free of any feedback, will be while a command acts.
 
-    Half a period of it is added to ``u[i]``, ``lag`` of it to the thrust, which is returned; its angular acceleration, body frame, is
-    put into ``turning[i]``. ``memory[o : o + 9]`` holds the last planned vector, its rate and filtered second derivative.
+    By half a period and ``lag`` the size of the thrust is led, which is returned: it is held for a period. Its direction is not, for attitudes follow the wanted rate in
+    between. Its angular acceleration, body frame, is put into ``turning[i]``. ``memory[o : o + 9]`` holds the last planned vector, its rate and filtered second
+    derivative.
     """
     q = attitudes[i]
     size = math.sqrt(max(p[0] * p[0] + p[1] * p[1] + p[2] * p[2], 1e-12))
@@ -129,8 +130,7 @@ def look_ahead(i, fresh, dt, keep, lag, p, memory, o, u, attitudes, turning):  #
         memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend
         # A difference is that of the middle of the last period.
         rate += 0.5 * dt * memory[o + 6 + k]
-        u[i, k] += 0.5 * dt * rate
-        more += lag * rate * p[k] / size
+        more += (lag + 0.5 * dt) * rate * p[k] / size
     x, y, _ = quaternion.into_body(
         q[0], q[1], q[2], q[3], memory[o + 6], memory[o + 7], memory[o + 8]
     )

@@ -25,7 +25,9 @@ NUMBERS = Layout(team={"m": 1, "g": 1, "kind": 1, "axis": 3, "J": 9, "centre": 3
 N = NUMBERS.at
 STATE = Layout(team={"calls": 1})
 """Memory, behind which forces, ends and planned forces (3 n each) follow; then what is
-asked of each cable along its planned direction, over its part of the force (n), and the nominal pulls (9 n)."""
+asked of each cable along its planned direction, over its part of the force (n), the second derivatives as they were (3 n), and the nominal pulls (9 n)."""
+LATE = 1.0
+"""Age of a filtered second difference, in periods."""
 FIRM, FAINT = 0.35, 0.25
 """Share of a cable's part of the force below which its pull is not taken for a direction as it is, and least pull over that."""
 
@@ -44,7 +46,7 @@ def numbers(team: Team) -> Vector:
 
 def room(team: Team) -> int:
     """Length of the memory."""
-    return 0 if team.body is None else STATE.size(0) + 19 * team.n
+    return 0 if team.body is None else STATE.size(0) + 22 * team.n
 
 
 @inline
@@ -119,13 +121,15 @@ def plan_pulls(n, formation, reference, attitude, rates, learned, dt, keep, para
     calls = memory[0]
     memory[0] = min(calls + 1.0, 3.0)
     for i in range(n):
-        o = 1 + 3 * count + n + 9 * i
+        o, f = 1 + 4 * count + n + 9 * i, 1 + 3 * count + n + 3 * i
         for k in range(3):
             # Differences are those in the middle of a period, or at its begin: they are led to its end.
             past = memory[o + 3 + k] - 0.5 * dt * memory[o + 6 + k]
             rate = 0.0 if calls < 1.0 else (w[3 * i + k] - memory[o + k]) / dt
             bend_k = 0.0 if calls < 2.0 else (rate - past) / dt
-            memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend_k
+            before = memory[f + k]
+            memory[f + k] = keep * before + (1.0 - keep) * bend_k
+            memory[o + 6 + k] = memory[f + k] + LATE * (memory[f + k] - before)
             memory[o + 3 + k] = rate + 0.5 * dt * memory[o + 6 + k]
             memory[o + k] = w[3 * i + k]
 

@@ -41,9 +41,11 @@ MEMORY = Layout(
     team={"planned": 3, "plan": 3},
     drone={
         "started": 1, "direction": CABLE, "aim": AIM_ALONG, "ahead": AHEAD, "jerk": 3, "snap": 3, "change": 9,
+        "told": 1, "beside": 1, "tension": 1,
     },
 )  # fmt: skip
-"""``planned``: thrust vector as far as it is free of noise, ``plan`` as far as it is free of any feedback; ``change``: pull that the load's motion asks for, two derivatives."""
+"""``planned``: thrust vector as far as it is free of noise, ``plan`` as far as it is free of any feedback; ``change``: pull that the load's motion asks for, two derivatives;
+of a rigid load the ``tension`` as it is now, by what was ``told`` last ``beside`` the plan."""
 P, M = PARAMS.at, MEMORY.at
 
 
@@ -73,6 +75,16 @@ def _ask_for(i, share, wanted, dt, keep, memory, o):  # type: ignore[no-untyped-
         memory[o + M.change + k] = -share * wanted[i, 2, k]
         memory[o + M.change + 3 + k] = -share * jerk
         memory[o + M.change + 6 + k] = -share * memory[o + M.snap + k]
+
+
+@inline
+def _tension_now(i, told, nominal, memory, o):  # type: ignore[no-untyped-def]
+    """Of what is held between two answers only the difference from the plan, which goes on meanwhile."""
+    planned, _, _ = size_of(i, nominal)
+    if told != memory[o + M.told] or memory[o + M.started] == 0.0:
+        memory[o + M.told] = told
+        memory[o + M.beside] = told - planned
+    memory[o + M.tension] = max(planned + memory[o + M.beside], 0.0)
 
 
 @inline
@@ -139,9 +151,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             if n <= 2 and stands:  # from here the pull goes on once the load swings
                 for k in range(3):
                     memory[d + 9 + k], memory[d + 12 + k] = T[i] * memory[d + k], 0.0
-        short_x -= T[i] * memory[d]
-        short_y -= T[i] * memory[d + 1]
-        short_z -= T[i] * memory[d + 2]
+        pull = T[i]
+        if params[P.rigid] > 0.0:
+            _tension_now(i, T[i], nominal, memory, o)
+            pull = memory[o + M.tension]
+        short_x -= pull * memory[d]
+        short_y -= pull * memory[d + 1]
+        short_z -= pull * memory[d + 2]
     # A load that stands is carried by the ground.
     short = (0.0, 0.0, 0.0) if stands else (short_x, short_y, short_z)
     soft = CALM if stands else 1.0
@@ -159,6 +175,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         span = L + spans[i, 0]
         rate, bend = spans[i, 1] + reeled[i, 1], spans[i, 2] + reeled[i, 2]
         led = not math.isnan(courses[i, 0, 0])
+        tension = memory[o + M.tension] if params[P.rigid] > 0.0 else T[i]
         push = 0.0
         for k in range(3):
             a = o + M.direction + k
@@ -181,8 +198,8 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             turning = span * memory[a + 6] + 2.0 * rate * memory[a + 3] + bend * memory[a]
             motion = courses[i, 2, k] if led else wanted[i, 2, k] - turning
             needed = m * (motion + (g if k == 2 else 0.0))
-            planned[k] = needed - T[i] * memory[a]
-            known = T[i] * pull + forces[i, k] + m / params[P.total] * short[k]
+            planned[k] = needed - tension * memory[a]
+            known = tension * pull + forces[i, k] + m / params[P.total] * short[k]
             u[i, k] = needed + m * most * u[i, k] - known
         more = 0.0
         if params[P.rigid] > 0.0:
@@ -200,7 +217,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
                 nominal_thrust(i, m, g, span, wanted, nominal, planned_now)
                 more = look_ahead(
                     i, memory[o + M.started] == 0.0, dt, keep_plan, params[P.lag], planned_now, memory,
-                    o + M.ahead, u, sees.estimated_attitudes, writes.desired_turning,
+                    o + M.ahead, sees.estimated_attitudes, writes.desired_turning,
                 )  # fmt: skip
                 planned[0], planned[1], planned[2] = planned_now
             limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
@@ -310,7 +327,7 @@ class Formation(PositionControlPart, Delays):
         ):
             plan_pulls(team.n, formation, motion, attitude, rates, told, 1.0, 0.0, own, kept)
             row[:] = kept[-9 * team.n :].reshape(team.n, 3, 3)[:, 0]
-            asked[:] = kept[-10 * team.n : -9 * team.n]
+            asked[:] = kept[-13 * team.n : -12 * team.n]
         return found, taut
 
     def memory(self, team: Team) -> Vector:
