@@ -46,6 +46,7 @@ class Rig:
         self.straighten()
         self.thrusts, self.torques = np.zeros(n), np.zeros((n, 3))
         self.external, self.attached = np.zeros((n + 1, 3)), np.ones(n)
+        self.moment = np.zeros(3)
         self.tensions, self.slack_times = np.zeros(n), np.zeros(n)
         self.peak_tensions, self.catch_impulses = np.zeros(n + 1), np.zeros(n)
         self.winches, self.time = np.zeros((n, 4)), 0.0
@@ -69,7 +70,7 @@ class Rig:
     def _signals(self):
         return {
             "applied_thrusts": self.thrusts, "applied_torques": self.torques,
-            "external_forces": self.external, "winches": self.winches, "attached": self.attached, "tensions": self.tensions,
+            "external_forces": self.external, "external_moment": self.moment, "winches": self.winches, "attached": self.attached, "tensions": self.tensions,
             "peak_tensions": self.peak_tensions, "catch_impulses": self.catch_impulses,
             "slack_times": self.slack_times, "ground_forces": self.ground_forces,
             "touch_speeds": self.touch_speeds,

@@ -55,7 +55,7 @@ def test_accelerations_and_tensions_agree_with_maximal_coordinates(n):
         )
         slope, T = np.zeros_like(rig.state), np.zeros(n)
         derivative(
-            n, rig.state, rig.thrusts, rig.torques, rig.external, rig.attached,
+            n, rig.state, rig.thrusts, rig.torques, rig.external, np.zeros(3), rig.attached,
             np.zeros(2 * n + 2), 0.0, rig.params, np.zeros(n), T, np.zeros(3 * n), np.zeros(n),
             rig.ground_forces, slope,
         )  # fmt: skip

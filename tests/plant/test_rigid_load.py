@@ -92,7 +92,7 @@ def test_accelerations_and_tensions_agree_with_maximal_coordinates(n):
         wanted, turned, tensions = oracle(rig, thrusts, external)
         slope, T = np.zeros_like(rig.state), np.zeros(n)
         derivative(
-            n, rig.state, thrusts, rig.torques, external, rig.attached, np.zeros(2 * n + 16), 0.0,
+            n, rig.state, thrusts, rig.torques, external, np.zeros(3), rig.attached, np.zeros(2 * n + 16), 0.0,
             rig.params, np.zeros(n), T, np.zeros(3 * n), np.zeros(n), rig.ground_forces, slope,
         )  # fmt: skip
         close = {"rtol": 0, "atol": 1e-9 * max(1.0, np.abs(wanted).max(), np.abs(turned).max())}
@@ -132,6 +132,26 @@ def test_energy_and_momenta_are_conserved(plant):
         assert later[0] == pytest.approx(energy, rel=1e-9 if plant is PLANTS[0] else 1e-4)
     np.testing.assert_allclose(later[1], momentum, rtol=0, atol=1e-9)
     np.testing.assert_allclose(later[2], angular, rtol=0, atol=1e-7 * np.abs(angular).max() + 1e-9)
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [*PLANTS, pytest.param(Mujoco(), marks=pytest.mark.skipif(
+        importlib.util.find_spec("mujoco") is None, reason="needs mujoco"
+    ))],
+    ids=lambda plant: type(plant).__name__,
+)  # fmt: skip
+def test_a_moment_on_the_load_changes_the_angular_momentum_of_all_at_its_rate(plant):
+    rig, _ = tumbling(3, 3, plant, gravity=0.0)
+    rig.moment[:] = 0.05, -0.02, 0.03  # world, however the load turns
+
+    def angular():
+        return rig.angular_momentum() + rig.turning()[1]
+
+    before, momentum = angular(), rig.momentum()
+    rig.step(dt=0.0005, count=800)
+    np.testing.assert_allclose(angular() - before, 0.4 * rig.moment, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(rig.momentum(), momentum, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("plant", PLANTS[:2], ids=lambda plant: type(plant).__name__)

@@ -12,7 +12,7 @@ from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.record.moments import find_moments
-from colift.team.contact import FLAT, first_contact
+from colift.team.contact import FLAT, Boxes, first_contact
 
 HOVER = {
     "name": "test",
@@ -61,6 +61,51 @@ def test_a_drone_touches_the_load() -> None:
         0,
         "drone {0} touched the load",
     )
+
+
+def test_a_drone_touches_the_box_of_a_rigid_load_wherever_it_comes_near() -> None:
+    """A box that is turned by a right angle about the vertical: what was its length is across."""
+    size, half = np.array([1.0, 0.4, 0.2]), math.sqrt(0.5)
+    for q, reach in (((1.0, 0.0, 0.0, 0.0), 0.5), ((half, 0.0, 0.0, half), 0.2)):
+        boxes = Boxes(size, np.zeros((1, 3)), np.array([q]))
+        for beyond, touch in ((0.19, True), (0.21, False)):
+            at = np.array([[[reach + beyond, 0.0, 0.05], [0.0, 0.0, 3.0]]])
+            np.testing.assert_allclose(boxes.away(at)[0, 0], [beyond, 0.0, 0.0], atol=1e-12)
+            found = first_contact(
+                np.full(2, 0.2), np.ones(2), at, np.zeros((1, 2, 3)), np.zeros((1, 2)), boxes
+            )
+            assert found == ((0, "drone {0} touched the load") if touch else None)
+    above = np.array([[[0.3, 0.0, 0.1 + 0.09]]])  # drones are half as tall
+    boxes = Boxes(size, np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]))
+    assert first_contact(
+        np.full(1, 0.2), np.ones(1), above, np.zeros((1, 1, 3)), np.zeros((1, 1)), boxes
+    )
+    inside = np.array([[[0.4, -0.1, 0.0]]])
+    assert not boxes.away(inside).any()
+
+
+def test_a_flight_ends_where_a_drone_comes_down_on_its_box() -> None:
+    """One drone's motors stop above the box: it falls on it, and nobody flies through."""
+    load = {
+        "kind": "rigid",
+        "mass": 0.5,
+        "size": [1.6, 1.2, 0.2],
+        "attachments": [[0.3, 0.2, 0.1], [-0.3, 0.2, 0.1], [-0.3, -0.2, 0.1], [0.3, -0.2, 0.1]],
+    }
+    falls = {
+        "name": "falls", "load": load, "drones": {"radius": 0.15, "mass": 0.5, "max_thrust": 12.0, "arm": 0.1}, "reference": {"kind": "hover"},
+        "timing": {"duration": 4.0}, "fault": [{"kind": "drone-lost", "drone": 1, "at": 1.0}],
+    }  # fmt: skip
+    run = colift.run(falls)
+    assert "drone 1 touched the load" in run.recording.outcome
+    assert run.metrics["min_load_distance_m"] < 0.2
+    whole = colift.run({**falls, "fault": []})
+    assert whole.recording.outcome == "completed"
+    assert whole.metrics["min_load_distance_m"] == pytest.approx(
+        float(np.min(whole.recording["positions"][:, :, 2] - whole.recording["load"][:, :1, 2]))
+        - 0.1,
+        abs=0.02,
+    )  # straight above it
 
 
 def test_the_first_of_many_rows_counts() -> None:

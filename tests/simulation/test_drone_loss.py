@@ -69,7 +69,7 @@ def test_metrics_and_report_take_the_gap(tmp_path):
     }  # fmt: skip
     assert unknown == lifts | {
         "tension_integral_10s_Ns", "detection_delay_s", "max_catch_impulse_Ns", "peak_thrust_fraction",
-        "min_downwash_distance_m", "attitude_rms_deg", "attitude_max_deg", "yaw_max_deg",
+        "min_downwash_distance_m", "min_load_distance_m", "attitude_rms_deg", "attitude_max_deg", "yaw_max_deg",
         "max_missing_moment_Nm",
     }  # fmt: skip
     assert write_report(run.recording, tmp_path, metrics=run.metrics).stat().st_size > 1e4

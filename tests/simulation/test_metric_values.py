@@ -133,7 +133,13 @@ EXPECTED = {
 }
 
 
-TURNED = {"attitude_rms_deg", "attitude_max_deg", "yaw_max_deg", "max_missing_moment_Nm"}
+TURNED = {
+    "min_load_distance_m",
+    "attitude_rms_deg",
+    "attitude_max_deg",
+    "yaw_max_deg",
+    "max_missing_moment_Nm",
+}
 """Of a rigid load: test_rigid_loads_fly.py has answers."""
 
 

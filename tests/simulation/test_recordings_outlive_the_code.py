@@ -121,7 +121,7 @@ NEWER = {"phase", "ground_forces", "touch_speeds", "clock", "measured_ages", "es
          "lifted_mass", "measured_specific_forces", "specific_force_ages", "reeled", "found_lengths", "learned_load",
          "load_attitude", "load_rates", "reference_attitude", "reference_rates", "moment",
          "measured_load_attitude", "measured_load_rates", "estimated_load_attitude",
-         "estimated_load_rates", "allocator_moment_residual"}  # fmt: skip
+         "estimated_load_rates", "allocator_moment_residual", "external_moment"}  # fmt: skip
 """Signals that came after the recording that is kept here."""
 
 

@@ -489,6 +489,11 @@ class Flight:
             positions,
             self._ends(log, team)[:, :, 0],
             log[:, where["attached"]],
+            None
+            if team.body is None
+            else contact.Boxes(
+                team.body.size, log[:, where["load"]][:, :3], log[:, where["load_attitude"]]
+            ),
         )
         if found is None:
             return None

@@ -48,7 +48,7 @@ Wires = named_tuple("Wires", FUNCTIONS, __name__)
 Common = named_tuple(
     "Common",
     [
-        "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces",
+        "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces", "external_moment",
         "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "clock_bends", "lean", "formations", "formation", "reference",
         "reference_attitude", "reference_rates", "nominal_forces", "attachments",
         "estimated_load", "estimated_load_attitude", "estimated_load_rates", "estimated_ends", "wanted_ends", "reference_shift",
@@ -220,6 +220,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
                 bus.attached[i] = 0.0
         bus.wind[:] = 0.0
         bus.external_forces[:] = 0.0
+        bus.external_moment[:] = 0.0
         for m in range(disturbances):
             _disturb(disturbing[m], k, t, dt)
         _step(wires.plant, k, t, dt)

@@ -292,12 +292,14 @@ PORTS: dict[str, Port] = {
         Port("plant_observe", sees=()),
         Port(
             "plant",
-            sees=("applied_thrusts", "applied_torques", "external_forces", "attached", "winches"),
+            sees=(
+                "applied_thrusts", "applied_torques", "external_forces", "external_moment", "attached", "winches",
+            ),
         ),
         Port(
             "disturbance",
             sees=(
-                "load", "ends", "positions", "velocities", "attitudes", "directions",
+                "load", *_turned(""), "ends", "positions", "velocities", "attitudes", "directions",
                 "direction_rates", "applied_thrusts", "attached",
             ),
         ),

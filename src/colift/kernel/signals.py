@@ -123,6 +123,7 @@ SIGNALS = (
     Signal("estimated_load_rates", (3,), "rad/s", "-", "load", "its rates that the controllers use", writer="estimation"),
     Signal("found_lengths", ("n",), "m", "-", "-", "by how much each cable is found to be longer than is told", writer="observation"),
     Signal("learned_load", (10,), "kg, kg m, kg m^2", "theta", "load", "what is learned of a rigid load beyond what is told: mass, first moment (3), inertia about its place (xx, yy, zz, yz, xz, xy)", writer="load_control"),
+    Signal("external_moment", (3,), "N m", "-", "world", "disturbing moment on a rigid load about its centre of mass", writer="disturbance"),
 )  # fmt: skip
 """Every recorded signal; one row of the log each recording period."""
 

@@ -192,13 +192,24 @@ def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
     ends = np.zeros((team.n, 3)) if team.body is None else team.body.attachments
     positions = ends - team.cable_lengths[:, None] * frame.start_directions()
     found = contact.first_contact(
-        team.radii, team.cable_lengths, positions[None], ends[None], np.ones((1, team.n))
+        team.radii,
+        team.cable_lengths,
+        positions[None],
+        ends[None],
+        np.ones((1, team.n)),
+        _box(team),
     )
     if found is not None:
         field = "cone_deg" if given is None else "directions"
         value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
         message = f"must leave the drones (drones.radius) apart: {found[1].format(*drones)}"
         yield Problem(f"start.{field}", value, message.replace("touched", "touch"))
+
+
+def _box(team: Team) -> contact.Boxes | None:
+    """A rigid load at the start, level at the origin."""
+    level = np.array([[1.0, 0.0, 0.0, 0.0]])
+    return None if team.body is None else contact.Boxes(team.body.size, np.zeros((1, 3)), level)
 
 
 def _length_checks(frame: Frame, n: int, broken: set[str]) -> Iterable[Problem]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from colift.control.allocation.base import Allocation
 from colift.part import Part
 from colift.team import Team
+from colift.team.load import LEVEL
 from colift.world.disturbance.base import DisturbancePart
 
 Array = NDArray[np.float64]
@@ -138,6 +139,7 @@ def _pushes(team: Team, hover: Allocation, parts: Sequence[DisturbancePart], win
         "attached": np.ones(team.n),
         "wind": np.array(wind),
         "external_forces": np.zeros((team.n + 1, 3)),
+        "load_attitude": np.array(LEVEL) if team.body is None else team.body.hang,
     }
     found = np.zeros((team.n + 1, 3))
     for part in parts:

@@ -20,6 +20,7 @@ from colift.mission.criteria import METRICS
 from colift.record.ends import cable_ends
 from colift.record.recording import Recording
 from colift.record.resting import rests
+from colift.team.contact import Boxes
 from colift.team.geometry import pairwise_angles
 
 _FORMULAS: dict[str, Callable[[Recording], float]] = {}
@@ -222,6 +223,15 @@ def min_cable_distance_m(r: Recording) -> float:
         distance[:, np.arange(n), np.arange(n)] = np.nan
         least = min(least, np.nanmin(distance, initial=math.inf))
     return float(least) if math.isfinite(least) else float("nan")
+
+
+@_metric
+def min_load_distance_m(r: Recording) -> float:
+    body = r.mission.true_team.body
+    if body is None or "load_attitude" not in r:
+        return float("nan")
+    boxes = Boxes(body.size, r["load"][:, 0], r["load_attitude"])
+    return -_largest(-np.linalg.norm(boxes.away(r["positions"]), axis=-1))
 
 
 @_metric

@@ -12,10 +12,12 @@ from pydantic import Field
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
+from colift.kernel.math.small import cross
 from colift.part import Vector
 from colift.team import Team
 from colift.team.scaling import PAPER_LOAD
 from colift.team.vehicles import PAPER_MASS
+from colift.world.disturbance._lever import Metre, arm_of, turn_by
 from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Area = Annotated[float, Field(ge=0.0, le=10.0)]
@@ -31,11 +33,11 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 PARAMS = Layout(
     team={
-        "density": 1, "drone_linear": 1, "load_area": 1, "load_linear": 1, "cable": 1,
+        "density": 1, "drone_linear": 1, "load_area": 1, "load_linear": 1, "cable": 1, "arm": 3, "centre": 3,
     },
     drone={"drone_area": 1, "rotor_drag": 1},
 )  # fmt: skip
-"""``cable``: drag coefficient times diameter."""
+"""``cable``: drag coefficient times diameter; ``arm``: from a rigid load's centre of mass to where the air pushes it, ``centre``: that of mass, in the load's frame."""
 P = PARAMS.at
 
 
@@ -57,9 +59,17 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     wind, external = writes.wind, writes.external_forces
     n = positions.shape[0]
     half_rho = 0.5 * params[P.density]
+    before = (external[n, 0], external[n, 1], external[n, 2])
     _on_body(
         load[1], wind, half_rho * params[P.load_area], params[P.load_linear], external[n]
     )  # fmt: skip
+    turn_by(
+        P.arm, params, external[n, 0] - before[0], external[n, 1] - before[1], external[n, 2] - before[2], sees, writes,
+    )  # fmt: skip
+    q = sees.load_attitude
+    cx, cy, cz = quaternion.into_world(
+        q[0], q[1], q[2], q[3], params[P.centre], params[P.centre + 1], params[P.centre + 2]
+    )
     for i in range(n):
         _on_body(
             velocities[i], wind, half_rho * params[P.rows + P.width * i + P.drone_area], params[P.drone_linear],
@@ -91,11 +101,21 @@ def _drag(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 squared += past * past
             normal = math.sqrt(max(squared - along * along, 0.0))
             scale = _WEIGHTS[m] * half_rho * params[P.cable] * length * normal
+            pushed = (0.0, 0.0, 0.0)
             for k in range(3):
                 past = wind[k] - (1.0 - s) * velocities[i, k] - s * ends[i, 1, k]
                 force = scale * (past - along * directions[i, k])
                 external[i, k] += (1.0 - s) * force
                 external[n, k] += s * force
+                pushed = (pushed[1], pushed[2], s * force)
+            arm = (
+                ends[i, 0, 0] - load[0, 0] - cx,
+                ends[i, 0, 1] - load[0, 1] - cy,
+                ends[i, 0, 2] - load[0, 2] - cz,
+            )
+            moment = cross(arm, pushed)
+            for k in range(3):
+                writes.external_moment[k] += moment[k]
 
 
 class Drag(DisturbancePart):
@@ -124,6 +144,8 @@ class Drag(DisturbancePart):
     load_area: Area | None = None
     """Drag coefficient times frontal area of the load, m^2. None: 0.006 for 0.225 kg (about that of a cube of 7.5 cm), and for
     others as the surface of bodies of the same density."""
+    load_centre: tuple[Metre, Metre, Metre] = (0.0, 0.0, 0.0)
+    """Where the air pushes a rigid load, its frame, m: beside its centre of mass it turns it."""
     load_linear: Linear = 0.0
     """Linear drag of the load, N s/m."""
     rotor_drag: RotorDrag | list[RotorDrag] | None = None
@@ -149,4 +171,5 @@ class Drag(DisturbancePart):
             drone_linear=self.drone_linear, load_area=float(self.settled("load_area", team)[0]),
             load_linear=self.load_linear, rotor_drag=self.settled("rotor_drag", team),
             cable=float(self.settled("cable_diameter", team)[0]) * self.cable_coefficient,
+            arm=arm_of(self.load_centre, team), centre=np.zeros(3) if team.body is None else team.body.centre,
         )  # fmt: skip

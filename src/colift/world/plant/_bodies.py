@@ -32,6 +32,7 @@ from colift.world.plant._load import (
     into_world,
     speed_at,
     spin,
+    twist,
 )
 from colift.world.plant._params import BODY as BODY
 from colift.world.plant._params import CORNERS, PARAMS, P
@@ -47,7 +48,7 @@ def state_size(n: int) -> int:
 
 
 @inline
-def free_motion(n, y, thrusts, torques, external, params, dy):  # type: ignore[no-untyped-def]
+def free_motion(n, y, thrusts, torques, external, moment, params, dy):  # type: ignore[no-untyped-def]
     """Time derivative of the state without cables (paper eqs. 1 to 3 with T = 0)."""
     m_L, g = params[0], params[1]
     for k in range(3):
@@ -55,6 +56,9 @@ def free_motion(n, y, thrusts, torques, external, params, dy):  # type: ignore[n
         dy[3 + k] = external[n, k] / m_L
     dy[5] -= g
     spin(y, params, dy)
+    if params[P.rigid] > 0.0:
+        u, v, w = into_load(y, moment[0], moment[1], moment[2])
+        twist(u, v, w, params, dy)
     for i in range(n):
         o = LOAD + DRONE * i
         m = params[MASS + BODY * i]

@@ -113,6 +113,7 @@ def derivative(  # type: ignore[no-untyped-def]
     thrusts,
     torques,
     external,
+    moment,
     attached,
     longest,
     anchors,
@@ -128,7 +129,7 @@ def derivative(  # type: ignore[no-untyped-def]
 
     Cables have these ``lengths``, which grow at ``rates``: what is wound up stretches no more.
     """
-    free_motion(n, y, thrusts, torques, external, params, dy)
+    free_motion(n, y, thrusts, torques, external, moment, params, dy)
     grounded, rigid = params[P.ground] > 0.0, params[P.rigid] > 0.0
     if grounded:
         touch(n, y, anchors, w, params, forces, dy)
@@ -242,6 +243,7 @@ def note_catches(n, y, attached, T, params, lengths, rates, parting, catch_impul
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    moment = sees.external_moment
     attached = sees.attached
     tensions, peak_tensions = writes.tensions, writes.peak_tensions
     catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
@@ -273,7 +275,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 at = now.time + (substep + STAGES[stage]) * h
                 wind(n, winches, at, params, L, rates, bends)
             derivative(
-                n, k, y, thrusts, torques, external, attached, longest, anchors, w, params, L, rates,
+                n, k, y, thrusts, torques, external, moment, attached, longest, anchors, w, params, L, rates,
                 T, forces, slope,
             )  # fmt: skip
             runge_kutta(stage, size, h, begin, slope, total, y)

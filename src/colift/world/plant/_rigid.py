@@ -201,14 +201,29 @@ def demand(n, y, dy, params, alpha, bends, b):  # type: ignore[no-untyped-def]
 
 @inline
 def derivative(  # type: ignore[no-untyped-def]
-    n, y, thrusts, torques, external, held, anchors, w, params, bends, T, alpha, b, forces, dy
+    n,
+    y,
+    thrusts,
+    torques,
+    external,
+    moment,
+    held,
+    anchors,
+    w,
+    params,
+    bends,
+    T,
+    alpha,
+    b,
+    forces,
+    dy,
 ):
     """Time derivative of the state under the held cables; fills the tensions ``T`` and the ground's ``forces``.
 
     ``bends`` are the second derivatives of the cables' lengths.
     ``alpha`` (3 numbers a drone) and ``b`` (one) are for intermediate results.
     """
-    free_motion(n, y, thrusts, torques, external, params, dy)
+    free_motion(n, y, thrusts, torques, external, moment, params, dy)
     if params[P.ground] > 0.0:
         touch(n, y, anchors, w, params, forces, dy)
     lines(n, y, params, alpha, b)

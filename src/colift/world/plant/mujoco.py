@@ -122,7 +122,10 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     model, data, n = scene.model, scene.data, thrusts.shape[0]
     state, rest, parting = np.split(memory, [state_size(n), memory.size - n])
     warm_start = rest[: model.nv]
-    if not all(np.abs(a).max() < mujoco.mjMAXVAL for a in (thrusts, torques, external, state)):
+    if not all(
+        np.abs(a).max() < mujoco.mjMAXVAL
+        for a in (thrusts, torques, external, sees.external_moment, state)
+    ):
         state[:] = np.nan  # MuJoCo would go on with other numbers; a flight that diverges shall end
         return
     # MuJoCo would soften, without a word, a limit that its step cannot follow.
@@ -137,6 +140,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     controls = data.ctrl.reshape(n, 4)
     controls[:, 0], controls[:, 1:] = thrusts, torques
     data.xfrc_applied[1, :3] = external[n]
+    data.xfrc_applied[1, 3:] = sees.external_moment
     data.xfrc_applied[2:, :3] = external[:n]
     reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
     for substep in range(substeps):

@@ -38,6 +38,7 @@ SPANS = SCRATCH.spans
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    moment = sees.external_moment
     attached = sees.attached
     tensions, peak_tensions, slack_times = writes.tensions, writes.peak_tensions, writes.slack_times
     n = thrusts.shape[0]
@@ -65,6 +66,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             thrusts,
             torques,
             external,
+            moment,
             attached,
             anchors,
             w,

@@ -177,6 +177,7 @@ def catch(  # type: ignore[no-untyped-def]
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    moment = sees.external_moment
     attached = sees.attached
     tensions, peak_tensions = writes.tensions, writes.peak_tensions
     catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
@@ -206,7 +207,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             n, y, attached, slow, params, L, rates, taut, held, T, alpha, b, parting,
             catch_impulses,
         )  # fmt: skip
-        free_motion(n, y, thrusts, torques, external, params, slope)
+        free_motion(n, y, thrusts, torques, external, moment, params, slope)
         if params[P.ground] > 0.0:
             forces = writes.ground_forces if event == 0 else spare
             touch(n, y, anchors, w, params, forces, slope)
@@ -228,7 +229,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                     part = STAGES[stage] if stage < 4 else 1.0
                     wind(n, winches, since + part * h, params, L, rates, bends)
                 derivative(
-                    n, y, thrusts, torques, external, held, anchors, w, params, bends, T, alpha, b,
+                    n, y, thrusts, torques, external, moment, held, anchors, w, params, bends, T, alpha, b,
                     spare, slope,
                 )  # fmt: skip
                 if stage < 4:
