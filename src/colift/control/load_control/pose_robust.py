@@ -28,7 +28,9 @@ from colift.part import Vector
 from colift.team import Team
 from colift.team.plan import spanned
 
-ROBUST = Layout(team={"slope": 1, "axis": 3, "layer": 1, "strong": 1, "beta": 1, "bound": 1})
+ROBUST = Layout(
+    team={"slope": 1, "axis": 3, "layer": 1, "strong": 1, "beta": 1, "bound": 1, "yaw": 1}
+)
 """Parameters behind those of ``pose``; ``axis``: the line through the ends of two cables, about which nobody turns the load."""
 PARAMS = Layout(team={**POSE.team, **ROBUST.team})
 MEMORY = Layout(team={**HELD.team, "mu": 3})
@@ -59,7 +61,7 @@ def _pose_robust(now, sees, params, memory, writes):  # type: ignore[no-untyped-
             for k in range(3):
                 mu[k] *= params[P.bound] / most
         share *= params[P.strong]
-        push = (mu[0] - share * s[0], mu[1] - share * s[1], mu[2] - share * s[2])
+        push = (mu[0] - share * s[0], mu[1] - share * s[1], mu[2] - params[P.yaw] * share * s[2])
     hold_pose(now.dt, errors, (0.0, 0.0, 0.0), push, sees, params, memory, writes)
 
 
@@ -82,6 +84,9 @@ class PoseRobust(Pose):
     robust_integral: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     """Moment per angle and second of its integral there, 1/s, likewise; ``most_moment`` bounds it."""
 
+    yaw: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
+    """Share of that gain about the load's upright axis: tensions turn nothing about it, only cables that have turned, which takes longer."""
+
     def params(self, team: Team) -> Vector:
         kind, axis = spanned(team)
         slope = self.turn / (2.0 * self.damping) if self.damping > 0.0 else self.turn
@@ -91,6 +96,6 @@ class PoseRobust(Pose):
         own = ROBUST.pack(
             team.n, slope=slope, axis=axis if kind == LINE else np.zeros(3), layer=slope * angle,
             strong=self.robust * hold * angle, beta=self.robust_integral * hold * angle,
-            bound=self.most_moment * hold,
+            bound=self.most_moment * hold, yaw=self.yaw,
         )  # fmt: skip
         return np.concatenate([super().params(team), own])
