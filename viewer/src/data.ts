@@ -311,6 +311,39 @@ export function nearest(positions: ArrayLike<number>, n: number): Gap {
   return found;
 }
 
+/** Where two cables come nearest to each other. */
+export interface Clearance extends Gap {
+  /** On the one and on the other, m. */
+  points: [number[], number[]];
+}
+
+/** The two cables that are nearest to each other, as straight lines from drone to end; NaN when there are no two. */
+export function nearestCables(positions: ArrayLike<number>, ends: ArrayLike<number>, n: number): Clearance {
+  const found: Clearance = { one: -1, other: -1, distance: NaN, points: [[], []] };
+  const at = (from: ArrayLike<number>, i: number): number[] => [0, 1, 2].map((k) => from[3 * i + k]!);
+  const less = (a: number[], b: number[]): number[] => a.map((value, k) => value - b[k]!);
+  const dot = (a: number[], b: number[]): number => a.reduce((sum, value, k) => sum + value * b[k]!, 0);
+  const along = (a: number[], way: number[], share: number): number[] => a.map((value, k) => value + share * way[k]!);
+  const within = (share: number): number => Math.min(Math.max(share, 0), 1);
+  for (let i = 0; i < n; i++) {
+    for (let j = i + 1; j < n; j++) {
+      const [a, b] = [at(positions, i), at(positions, j)];
+      const [u, v] = [less(at(ends, i), a), less(at(ends, j), b)];
+      const [uu, uv, vv, apart] = [dot(u, u), dot(u, v), dot(v, v), less(a, b)];
+      const [ua, va, sine] = [dot(u, apart), dot(v, apart), dot(u, u) * dot(v, v) - dot(u, v) ** 2];
+      if (!(uu > 0 && vv > 0)) continue;
+      // The nearest points of the lines, then each moved to where its segment comes nearest to the other's point.
+      let s = sine > 1e-9 * uu * vv ? within((uv * va - vv * ua) / sine) : 0;
+      const t = within((uv * s + va) / vv);
+      s = within((uv * t - ua) / uu);
+      const points: [number[], number[]] = [along(a, u, s), along(b, v, t)];
+      const distance = Math.hypot(...less(points[0], points[1]));
+      if (distance < found.distance || Number.isNaN(found.distance)) Object.assign(found, { one: i, other: j, distance, points });
+    }
+  }
+  return found;
+}
+
 export interface Pair {
   one: number;
   other: number;

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import test from "node:test";
-import { angleBetween, closest, Column, Flight, nearest, SIGNALS, turnOf, WIDTHS } from "../src/data";
+import { angleBetween, closest, Column, Flight, nearest, nearestCables, SIGNALS, turnOf, WIDTHS } from "../src/data";
 import { MOST_PAIRED } from "../src/tables";
 import { carried, flight, near } from "./flights";
 
@@ -116,6 +116,20 @@ test("the nearest two drones are found, without those that are gone", () => {
   const positions = [0, 0, 0, 3, 0, 4, 0, 1, 0, NaN, NaN, NaN];
   assert.deepEqual(nearest(positions, 4), { one: 0, other: 2, distance: 1 });
   assert(Number.isNaN(nearest(positions, 1).distance));
+});
+
+test("two cables are as far apart as their nearest points, at ends and in between", () => {
+  // Crossed at 0.3 m, in their middles; then side by side; then end to end.
+  const crossed = nearestCables([-1, 0, 0, 0, -1, 0.3], [1, 0, 0, 0, 1, 0.3], 2);
+  assert(near([crossed.distance, ...crossed.points[0], ...crossed.points[1]], [0.3, 0, 0, 0, 0, 0, 0.3], 1e-12));
+  assert(near([nearestCables([0, 0, 1, 0.4, 0, 1], [0, 0, 0, 0.4, 0, 0], 2).distance], [0.4], 1e-12));
+  assert(near([nearestCables([0, 0, 0, 5, 0, 0], [1, 0, 0, 3, 0, 0], 2).distance], [2], 1e-12));
+  // Leaning away from each other: nearest at their lower ends, those of the first two of three.
+  const three = nearestCables([-1, 0, 1, 1, 0, 1, 0, 9, 1], [-0.2, 0, 0, 0.2, 0, 0, 0, 8, 0], 3);
+  assert.deepEqual([three.one, three.other], [0, 1]);
+  assert(near([three.distance], [0.4], 1e-12));
+  assert(Number.isNaN(nearestCables([0, 0, 1, NaN, NaN, NaN], [0, 0, 0, NaN, NaN, NaN], 2).distance));
+  assert(Number.isNaN(nearestCables([0, 0, 1], [0, 0, 0], 1).distance));
 });
 
 test("only a rigid load has an error of its attitude, only two drones have a distance", () => {
