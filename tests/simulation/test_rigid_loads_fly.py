@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,9 @@ from colift.mission.planned import Planned, planned
 from colift.mission.warnings import warnings_of
 from colift.record import metrics
 from colift.record.verdict import criteria_of
-from colift.team import Team
+from colift.team import Body, Team
 from colift.team.geometry import matrix_of
-from colift.team.plan import shares
+from colift.team.plan import hung, shares
 
 BOX: dict[str, Any] = {
     "name": "box",
@@ -310,6 +311,60 @@ def test_two_cables_do_not_hold_a_box_and_it_comes_down() -> None:
     events = [{"at": 1.0 + i, "field": "drones.lose", "value": i} for i in range(2)]
     recording = Flight(load_mission({**BOX, "events": events})).run()
     assert recording.outcome.startswith("descended from t = 2 s: 2 cables do not hold the attitude")
+
+
+@pytest.mark.parametrize("drone", [0, 1, 2])
+def test_a_box_that_falls_into_two_cables_comes_to_rest_below_them_before_it_goes_down(
+    drone: int,
+) -> None:
+    layers = ("load_control", "allocation", "position_control", "attitude_control")
+    changes: dict[str, Any] = {
+        "drones.count": 3, "reference.period": 6.4, "sensing.kind": "noisy", "timing.delay": 0.02, "timing.duration": 24.0, "seed": 6,
+        "fault": [{"kind": "cable-cut", "at": 7.0, "drone": drone}], "detection.kind": "residuals",
+        **{f"timing.{name}": 0.01 for name in layers},
+    }  # fmt: skip
+    recording = Flight(load_mission("box-figure-eight", changes)).run()
+    assert recording.outcome.startswith("descended")
+    rest = [other for other in range(3) if other != drone]
+    ends = recording.mission.team.body.attachments[rest]
+    turned = np.array([matrix_of(q) for q in recording["load_attitude"]])
+    line = turned @ (ends[1] - ends[0])
+    foot = turned @ (
+        ends[0]
+        - (ends[1] - ends[0]) * (ends[0] @ (ends[1] - ends[0])) / np.sum((ends[1] - ends[0]) ** 2)
+    )
+    hangs = np.degrees(np.arccos(foot[:, 2] / np.linalg.norm(foot, axis=1)))
+    level = np.degrees(np.arcsin(np.abs(line[:, 2]) / np.linalg.norm(line, axis=1)))
+    after = recording.time > 7.3
+    assert hangs[after].max() > 30.0  # it did fall
+    before = (recording.time > 12.5) & (recording.time < 13.5)
+    assert hangs[before].max() < 20.0
+    assert level[before].max() < 5.0
+    assert recording["load"][before, 0, 2].min() > 1.0
+    apart = np.linalg.norm(np.diff(recording["positions"][:, rest], axis=1), axis=2)
+    assert apart[after].min() > 0.6
+    found = metrics.compute(recording)
+    assert found["touch_speed_mps"] < 1.0
+    assert abs(recording["load"][-1, 1]).max() < 0.1  # it lies
+
+
+def test_what_hangs_on_two_cables_has_its_weight_below_the_line_through_their_ends() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        ends, centre = rng.normal(size=(2, 3)), rng.normal(size=3)
+        body = Body(inertia=np.diag([0.02, 0.03, 0.04]), attachments=ends, centre=centre)
+        team = replace(Team.uniform(2), body=body)
+        turned = body.arms @ matrix_of(hung(team)).T
+        line = turned[1] - turned[0]
+        foot = turned[0] - line * (turned[0] @ line) / (line @ line)
+        assert abs(line[2]) < 1e-12
+        np.testing.assert_allclose(foot[:2], 0.0, atol=1e-12)
+        assert foot[2] > 0.0
+        across = body.arms[1] - body.arms[0]
+        assert line[0] * across[1] == pytest.approx(line[1] * across[0])  # its heading stays
+    assert hung(
+        replace(Team.uniform(2), body=Body(np.eye(3), np.array([[0.1, 0, 0], [-0.1, 0, 0]])))
+    ).tolist() == [1, 0, 0, 0]
 
 
 def test_an_attitude_that_nobody_can_hold_is_warned_of_and_judged() -> None:

@@ -16,10 +16,13 @@ from colift.mission.outlook import Outlook, bound, outlook
 from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array
+from colift.team.load import LEVEL
 from colift.team.plan import taken_over
 
 LEVELLED = 1.4
 """Time in which a rigid load that is brought down loses the attitude that was wanted of it, s."""
+SWUNG = 6.0
+"""Time in which one that falls into two cables comes to rest below them, s: then it goes down."""
 
 
 @dataclass
@@ -93,7 +96,8 @@ class Membership:
         self.outlook = found._replace(pace=1.0, within=max(found.within, LEVELLED))
         self.descent = f"descended from t = {time:g} s: {found.reason}"
         position, velocity = bus.reference[:2].tolist()
-        return {"reference": Descent(position=position, velocity=velocity, at=clock)}
+        wait = SWUNG if found.hang != LEVEL else 0.0
+        return {"reference": Descent(position=position, velocity=velocity, at=clock, wait=wait)}
 
     def _taken_over(
         self, drones: list[int], before: list[int], bus: Any, parts: Mapping[str, Part]

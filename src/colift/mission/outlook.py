@@ -23,7 +23,7 @@ from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array
 from colift.team.load import LEVEL, from_to
-from colift.team.plan import shares
+from colift.team.plan import hung, shares
 from colift.world.actuation.base import ActuationPart
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def outlook(
         if team.n < FEWEST:
             cables = "1 cable does" if team.n == 1 else f"{team.n} cables do"
             reason = f"{cables} not hold the attitude of the load"
-            return Outlook(reason=reason)
+            return Outlook(tuple(hung(team).tolist()), reason=reason)
         held = allocation.leaning(team)
         if held is not None:
             hang = tuple(held[1].tolist())

@@ -85,6 +85,16 @@ def matrix_of(attitude: ArrayLike) -> Array:
     )
 
 
+def quaternion_of(matrix: Array) -> Array:
+    """Unit quaternion (4,), wxyz, of a rotation matrix (3, 3): the eigenvector of Bar-Itzhack's symmetric matrix (JGCD 2000)."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    K = np.array(
+        [[a + e + i, h - f, c - g, d - b], [h - f, a - e - i, b + d, c + g], [c - g, b + d, e - a - i, f + h], [d - b, c + g, f + h, i - a - e]]
+    )  # fmt: skip
+    found = np.linalg.eigh(K)[1][:, -1]
+    return np.asarray(found if found[0] >= 0.0 else -found)
+
+
 def zero_yaw_quaternion(thrust_direction: Array) -> Array:
     """Attitude (..., 4), wxyz, that turns e3 into the unit ``thrust_direction`` (..., 3) without yaw.
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from colift.kernel.spans import BODY, LINE, POINT
 from colift.team.bodies import Team
-from colift.team.geometry import Array, matrix_of, ring, zero_yaw_quaternion
+from colift.team.geometry import Array, matrix_of, quaternion_of, ring, zero_yaw_quaternion
 from colift.team.load import LEVEL
 
 LEAN = math.radians(30.0)
@@ -164,6 +164,24 @@ def least_lean(
         if found is not None:
             return float(angle), found
     return None
+
+
+def hung(team: Team) -> Array:
+    """Attitude (4,) in which a load hangs on two cables: their ends level, its centre of mass below the line through them, its heading as it is."""
+    level = np.array(LEVEL)
+    if team.body is None or team.n != 2:
+        return level
+    one, other = team.levers
+    line = other - one
+    size = np.linalg.norm(line)
+    foot = one - line * (one @ line) / max(size**2, 1e-12)
+    height, across = np.linalg.norm(foot), np.linalg.norm(line[:2])
+    if min(size, height, across) < 1e-6:  # it has no side that hangs down, or no heading
+        return level
+    own = np.array([line / size, np.cross(foot / height, line / size), foot / height])
+    along = np.array([line[0], line[1], 0.0]) / across
+    up = np.array([0.0, 0.0, 1.0])
+    return quaternion_of(np.array([along, np.cross(up, along), up]).T @ own)
 
 
 def wrench_map(arms: Array) -> Array:
