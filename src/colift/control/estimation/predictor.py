@@ -16,7 +16,7 @@ from colift.control.estimation._cables import load_from_drones
 from colift.control.estimation.base import SIGNATURE, EstimationPart
 from colift.control.margins import Filter
 from colift.control.tuning import lag_warnings, shorter
-from colift.kernel.jit import inline, kernel
+from colift.kernel.jit import aside, inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import quaternion
 from colift.kernel.math.ages import newer
@@ -33,6 +33,8 @@ FINEST = 0.5e-3
 SPARE = 0.02
 """By so much more than is told samples may be late, s; or by as much again, where that is more."""
 
+WAITED = 0.1
+"""Time after which a sample of a rigid load is believed however it is turned, s."""
 SETTLED = 20.0
 """Time in which the filter of a rigid load settles, s, where it does."""
 FAR, TURNED = 0.05, math.radians(5.0)
@@ -44,12 +46,12 @@ PARAMS = Layout(
     team={
         "delay": 1, "turn": 1, "lag": 1, "period": 1, "patience": 1, "smooth": 1, "g": 1, "m_L": 1,
         "steady": 1, "coast": 1, "load": FILTER.size(0), "drones": FILTER.size(0), "room": 1,
-        "slots": 1, "stamped": 1, "rigid": 1, "body": _pose.BODY.size(0),
+        "slots": 1, "stamped": 1, "rigid": 1, "wild": 1, "body": _pose.BODY.size(0),
     },
     drone={"m": 1, "L": 1, "arm": 3},
 )  # fmt: skip
 """``turn``: age of the attitudes; ``room``: accelerations of the told delay, of ``slots`` that a body's ring
-has; whether samples are ``stamped``, and the load has an attitude; ``arm``: of a cable's end, from its centre of mass."""
+has; whether samples are ``stamped``, and the load has an attitude; sine of half the angle that is ``wild``; ``arm``: of a cable's end, from its centre of mass."""
 BODY = Layout(
     team={
         "started": 1, "waited": 1, "age": 1, "sample": 6, "state": 9, "attitude": 4,
@@ -59,9 +61,13 @@ BODY = Layout(
 """Time ``waited`` since the last ``sample`` came, and its ``age``; ``state`` when it was taken: position, velocity, unexplained
 acceleration; age of the last measured attitude, and time ``since`` it came; ``thrust`` that acts; ``places``: of the ring, from the state's time to now; ``ring`` of known
 accelerations."""
-MEMORY = Layout(team={"load": None, "pose": _pose.POSE.size(0)}, drone={"body": None})
-P, F, B = PARAMS.at, FILTER.at, BODY.at
-POSE = _pose.POSE.size(0)
+SEEN = Layout(team={"known": 1, "age": 1, "q": 4, "w": 3})
+"""Of a rigid load: whether its attitude is ``known``, the age of the sample that was believed last, its attitude and rates."""
+MEMORY = Layout(
+    team={"load": None, "pose": _pose.POSE.size(0), "seen": SEEN.size(0)}, drone={"body": None}
+)
+P, F, B, S = PARAMS.at, FILTER.at, BODY.at, SEEN.at
+POSE, SEEING = _pose.POSE.size(0), SEEN.size(0)
 ALIVE = _pose.M.alive
 
 
@@ -171,6 +177,39 @@ def _attitude(o, i, age, dt, attitudes, rates, params, memory):  # type: ignore[
     return age - min(memory[o + B.since], params[P.steady])
 
 
+@aside
+def _believed(fresh, o, q, w, age, dt, params, memory):  # type: ignore[no-untyped-def]
+    """Whether a new sample of a rigid load is believed: not one that is turned wildly from where the load would have turned, until nothing else comes.
+
+    Its attitude and rates are kept then, else those before grow older.
+    """
+    memory[o + S.age] += dt
+    if memory[o + S.known] == 0.0:
+        memory[o + S.age], memory[o + S.known] = age, 1.0
+        for k in range(4):
+            memory[o + S.q + k] = q[k]
+        for k in range(3):
+            memory[o + S.w + k] = w[k]
+        return fresh
+    if not fresh:
+        return False
+    h, a = memory[o + S.age] - age, o + S.q
+    ew, ex, ey, ez = quaternion.turn(
+        memory[a], memory[a + 1], memory[a + 2], memory[a + 3],
+        h * memory[o + S.w], h * memory[o + S.w + 1], h * memory[o + S.w + 2],
+    )  # fmt: skip
+    _, x, y, z = quaternion.multiply(ew, -ex, -ey, -ez, q[0], q[1], q[2], q[3])
+    off = math.sqrt(x * x + y * y + z * z)
+    if not (off <= params[P.wild] or (h > WAITED and off < math.inf)):
+        return False
+    memory[o + S.age] = age
+    for k in range(4):
+        memory[o + S.q + k] = q[k]
+    for k in range(3):
+        memory[o + S.w + k] = w[k]
+    return True
+
+
 @kernel(SIGNATURE, counted=False)
 def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     step, dt = now.step, now.dt
@@ -187,7 +226,7 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     room = int(params[P.room])
     slots = int(params[P.slots])
     width = B.ring + 3 * slots
-    first = width + POSE  # the load and its pose come first
+    first = width + POSE + SEEING  # the load and its pose come first
     steps = round(params[P.delay] / dt)
     stride = max((steps + room - 1) // room, 1)
     if step % stride != 0:
@@ -255,6 +294,11 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     tracked = _sampled(
         0, 0, measured_ages[n, 0], params[P.period], dt, memory, load[0:1], load[1:2]
     )
+    seen = width + POSE
+    if params[P.rigid] != 0.0:
+        tracked = _believed(
+            tracked, seen, sees.measured_load_attitude, sees.measured_load_rates, measured_ages[n, 0], dt, params, memory
+        )  # fmt: skip
     if tracked and memory[width + ALIVE] != 0.0:  # heard of again
         memory[B.started] = 0.0
         _start(0, 0, load[0:1], load[1:2], memory)
@@ -290,17 +334,22 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if tracked:
         _correct(0, P.load, params, memory)
     ages[n, 0] = 0.0
-    # A rigid load goes on turning as it did when it was seen.
-    q, w, age = sees.measured_load_attitude, sees.measured_load_rates, measured_ages[n, 0]
-    age = min(max(age, 0.0), 0.5)
-    turned = quaternion.turn(q[0], q[1], q[2], q[3], w[0] * age, w[1] * age, w[2] * age)
-    for k in range(4):
-        writes.estimated_load_attitude[k] = turned[k]
     for k in range(3):
-        writes.estimated_load_rates[k] = w[k]
         p, v = _forecast(0, slot, slots, dt, memory, k)
         estimated_load[0, k] = p
         estimated_load[1, k] = v
+    if params[P.rigid] == 0.0:
+        return
+    # A rigid load goes on turning as it did when it was seen.
+    q, w, age = seen + S.q, seen + S.w, min(max(memory[seen + S.age], 0.0), 0.5)
+    wx, wy, wz = memory[w], memory[w + 1], memory[w + 2]
+    turned = quaternion.turn(
+        memory[q], memory[q + 1], memory[q + 2], memory[q + 3], wx * age, wy * age, wz * age
+    )
+    for k in range(4):
+        writes.estimated_load_attitude[k] = turned[k]
+    for k in range(3):
+        writes.estimated_load_rates[k] = memory[w + k]
 
 
 @cache
@@ -387,6 +436,8 @@ class Predictor(EstimationPart):
     """Time in which the integrated rate is drawn to the measured attitude, s; 0 believes each measurement."""
     gate: Annotated[float, Field(gt=0.0, le=1000.0)] = 100.0
     """Most surprise that a measurement may cause, standard deviations."""
+    wild_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 6.0
+    """Turn from one sample of a rigid load to the next, beyond what its rates explain, from which on the sample counts as wild and is left out, degrees."""
     load_from: Literal["sensor", "cables"] = "sensor"
     """Where the load is known from: its own tracking as long as there is some, or the drones alone."""
     patience: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
@@ -470,6 +521,7 @@ class Predictor(EstimationPart):
             steady=self.steady, coast=self.coast, room=self._room, slots=self._slots,
             stamped=float(self.delay_from == "stamps"), m=team.masses,
             L=team.cable_lengths, arm=team.levers, rigid=float(team.body is not None), body=body,
+            wild=math.sin(0.5 * math.radians(self.wild_deg)),
             load=self._filter(self.load_position_noise, self.load_velocity_noise),
             drones=self._filter(self.position_noise, self.velocity_noise),
         )  # fmt: skip

@@ -32,10 +32,12 @@ _WIDTHS = {
 _QUANTITIES = (
     "load_position", "load_velocity", "load_attitude", "load_rates", "position", "velocity", "attitude", "rates", "specific_force",
 )  # fmt: skip
-_CHANNELS = 16  # of random numbers per body: 0-6 and 11-12 the noise, two axes in each; 7-10 and 13 dropouts
+_CHANNELS = 16  # of random numbers per body: 0-6 and 11-12 the noise, two axes in each; 7-10 and 13 dropouts, 14 wild samples
 _TURNING, _SPINNING = 3, 5  # the first of attitude and rates; tracking has 0-2
 _FEELING = 11
 _LOAD_LOST, _TRACKING_LOST, _ATTITUDE_LOST, _RATES_LOST, _FEELING_LOST = 7, 8, 9, 10, 13
+_LOAD_WILD = 14
+_WILD = 1 << 40  # from the number of a sample to that of what makes it wild
 
 SENSOR = Layout(team={"period": 1, "delay": 1, "dropout": 1, "slots": 1, "samples": 1})
 """``slots``: samples that may be on their way; ``samples``: where they stand, as in :data:`MEMORY`."""
@@ -45,7 +47,7 @@ PARAMS = Layout(
     team={
         **{f"{name}_sensor": SENSOR.size(0) for name in _WIDTHS},
         **{f"{name}_error": QUANTITY.size(0) for name in _QUANTITIES},
-        "first_row": 1, "row": 1, "g": 1,
+        "first_row": 1, "row": 1, "g": 1, "wild": 1, "wild_place": 1, "wild_turn": 1,
     }
 )  # fmt: skip
 """``first_row`` and ``row``: begin and length of the drones' rows in memory."""
@@ -149,6 +151,13 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         sizes = P.load_attitude_error + Q.noise
         _disturb(memory, at + 6, 3, key, number, _TURNING, params, sizes)
         _disturb(memory, at + 10, 3, key, number, _SPINNING, params, sizes + _NEXT)
+        # The first of all says where all begins, and is never wild.
+        often = params[P.wild] if number >= 0 else 0.0
+        if often > 0.0 and noise.uniform(key, number, _LOAD_WILD) < often:
+            for k in range(3):
+                a, b = noise.normals(key, number + _WILD, k)
+                memory[at + k] += params[P.wild_place] * a
+                memory[at + 6 + k] += params[P.wild_turn] * b
         q = sees.load_attitude
         turned = _turn(q[0], q[1], q[2], q[3], memory[at + 6], memory[at + 7], memory[at + 8])
         for k in range(4):
@@ -320,6 +329,12 @@ class Noisy(SensingPart):
     """s."""
     load_dropout: Share = 0.0
     """Share of the samples that is lost."""
+    load_wild: Share = 0.0
+    """Share of the samples that are wild, as where markers are taken for others: place and attitude jump, for this sample."""
+    load_wild_position: Size = 0.3
+    """Standard deviation of that jump in place, each axis, m."""
+    load_wild_attitude_deg: Annotated[float, Field(ge=0.0, le=180.0)] = 60.0
+    """And in the attitude of a rigid load, about each axis, degrees."""
     tracking_period: Period = 0.005
     """Time between two samples of the drones' positions and velocities, s."""
     tracking_delay: Delay = 0.007
@@ -369,7 +384,13 @@ class Noisy(SensingPart):
             else:
                 size = getattr(self, f"{quantity}_noise")
             packed[f"{quantity}_error"] = QUANTITY.pack(0, noise=size, spread=spread, bias=fixed)
-        return PARAMS.pack(team.n, first_row=where.rows, row=where.width, g=team.gravity, **packed)
+        wild = {
+            "wild": self.load_wild, "wild_place": self.load_wild_position,
+            "wild_turn": math.radians(self.load_wild_attitude_deg),
+        }  # fmt: skip
+        return PARAMS.pack(
+            team.n, first_row=where.rows, row=where.width, g=team.gravity, **wild, **packed
+        )
 
     def layout(self) -> Layout:
         queues = {name: fifo.size(self._slots(name), width + 1) for name, width in _WIDTHS.items()}
