@@ -154,6 +154,22 @@ def test_a_moment_on_the_load_changes_the_angular_momentum_of_all_at_its_rate(pl
     np.testing.assert_allclose(rig.momentum(), momentum, rtol=0, atol=1e-6)
 
 
+def test_a_rod_pushes_along_itself_and_turns_no_drone():
+    """A drone that is pressed onto a rod upright above the load: both go down together, the load by the rod alone."""
+    m, m_L, F = 0.5, 0.8, 6.0
+    body = Body(box_inertia(m_L, SIZE), np.array([[0.0, 0.0, 0.1]]), size=SIZE)
+    team = replace(Team.uniform(1, mass=m, load_mass=m_L, gravity=0.0), body=body)
+    rig = Rig(team, np.array([[0.0, 0.0, -1.0]]), RigidCables())
+    rig.external[0] = 0.0, 0.0, -F
+    rig.torques[0] = 0.0, 0.0, 1e-3  # on a ball joint it spins by itself
+    rig.step(count=200)
+    assert rig.tensions[0] == pytest.approx(-F * m_L / (m + m_L), rel=1e-9)
+    assert rig.load[1, 2] == pytest.approx(-0.2 * F / (m + m_L), rel=1e-9)
+    assert rig.slack_times[0] == pytest.approx(0.2)
+    assert rig.drones[0, 12] == pytest.approx(0.2 * 1e-3 / team.inertias[0, 2], rel=1e-9)
+    assert not rig.state[10:13].any()
+
+
 @pytest.mark.parametrize("plant", PLANTS[:2], ids=lambda plant: type(plant).__name__)
 def test_cables_keep_their_lengths_and_what_is_observed_is_the_load_s_middle(plant):
     rig, _ = tumbling(5, 4, plant, gravity=0.0, rates=3.0)

@@ -1,4 +1,4 @@
-"""Quadrotors on rigid massless cables under a point load (paper eqs. 1 to 5), RK4 with projection.
+"""Quadrotors on rigid massless cables above their load (paper eqs. 1 to 5), RK4 with projection.
 
 The equations are in :mod:`colift.world.plant._rigid`. A tension may come out negative: a rigid rod would push. That
 time is counted as slack; a rod is never caught.
@@ -93,7 +93,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 
 
 class RigidCables(BodiesPart):
-    """Rigid massless cables that would push rather than go slack, point load; no settings."""
+    """Rigid massless cables that would push rather than go slack: rods on ball joints; no settings."""
 
     kernel = _step
     slackens = False
