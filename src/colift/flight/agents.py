@@ -14,11 +14,13 @@ from numba.extending import register_jitable
 from colift.kernel.ports import PORTS, Wire
 
 Sees, Writes = PORTS["agents"].Sees, PORTS["agents"].Writes
-_agree, _carry = PORTS["agents"].invoke, PORTS["network"].invoke
+Asked, Answers = PORTS["allocation"].Sees, PORTS["allocation"].Writes
+_agree, _carry, _plan = (PORTS[name].invoke for name in ("agents", "network", "allocation"))
 
 SIGNALS = (
-    "force", "steady_force", "members", "inboxes", "heard", "carrying", "desired_tensions",
-    "desired_directions", "outboxes", "agent_status", "received_tensions", "received_directions",
+    "force", "steady_force", "reference", "members", "inboxes", "heard", "carrying", "desired_tensions",
+    "desired_directions", "outboxes", "asking", "asked_forces", "team_tensions", "team_directions",
+    "agent_status", "received_tensions", "received_directions",
 )  # fmt: skip
 """What a cycle takes and gives of the bus, beside what the network does."""
 
@@ -27,15 +29,35 @@ SIGNALS = (
 def rows_of(bus, i):  # type: ignore[no-untyped-def]
     """What drone i sees and what it writes."""
     sees = Sees(
-        bus.force, bus.steady_force, bus.members[i : i + 1], bus.members, bus.inboxes[i],
+        bus.force, bus.steady_force, bus.reference, bus.members[i : i + 1], bus.members, bus.inboxes[i],
         bus.heard[i], bus.carrying,
     )  # fmt: skip
-    writes = Writes(bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i])
+    writes = Writes(
+        bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i],
+        bus.asking[i : i + 1], bus.asked_forces[i], bus.team_tensions[i], bus.team_directions[i],
+    )  # fmt: skip
     return sees, writes
 
 
 @register_jitable
-def decide(network, agents, bus, cycle, time, dt):  # type: ignore[no-untyped-def]
+def ask_for(allocation, bus, i, cycle, time, dt):  # type: ignore[no-untyped-def]
+    """Let the allocator answer drone i's question, with a memory that is this drone's alone."""
+    width = allocation.memory.shape[0] // bus.members.shape[0]
+    own = allocation.memory[width * i : width * (i + 1)]
+    sees = allocation.sees
+    asked = Asked(
+        bus.asked_forces[i], sees.moment, sees.reference, sees.reference_attitude, sees.reference_rates,
+        sees.estimated_load_attitude, sees.nominal_forces, sees.formation,
+    )  # fmt: skip
+    answers = Answers(
+        bus.team_tensions[i], bus.team_directions[i], allocation.writes.allocator_info
+    )
+    wire = Wire(allocation.kernel, allocation.key, allocation.params, own, asked, answers)
+    return _plan(wire, cycle, time, dt)
+
+
+@register_jitable
+def decide(network, agents, allocation, bus, cycle, time, dt):  # type: ignore[no-untyped-def]
     """Carry what the drones said in the last cycle; let each decide and fly what it decides at once."""
     _carry(network, cycle, time, dt)
     n = bus.members.shape[0]
@@ -45,6 +67,8 @@ def decide(network, agents, bus, cycle, time, dt):  # type: ignore[no-untyped-de
         own = agents.memory[width * i : width * (i + 1)]
         wire = Wire(agents.kernel, agents.key, agents.params, own, sees, writes)
         bus.agent_status[i] = _agree(wire, cycle, time, dt)
+        if bus.asking[i] != 0.0:
+            ask_for(allocation, bus, i, cycle, time, bus.asking[i])
         bus.received_tensions[i] = bus.desired_tensions[i]
         for k in range(3):
             bus.received_directions[i, k] = bus.desired_directions[i, k]

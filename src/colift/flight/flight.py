@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from colift.control.agents.base import AgentPart
 from colift.control.allocation.base import AllocatorPart
 from colift.control.reference.base import ReferencePart
 from colift.errors import ColiftError, Problem, SettingError
@@ -246,7 +247,7 @@ class Flight:
             raise ColiftError("plant: cannot change in flight")
         elif same:
             wire = getattr(leg.circuit.wires, section)
-            if part.memory(leg.team).shape != wire.memory.shape:
+            if self._memory(section, part, leg.team).shape != wire.memory.shape:
                 raise ColiftError(f"{section}: cannot change like this in flight")
             _refill(wire.params, packed, section)
             self._parts[section] = part
@@ -278,9 +279,10 @@ class Flight:
             load_attitude=tuple(old.bus.load_attitude.tolist()),
             load_rates=tuple(old.bus.load_rates.tolist()),
         )
+        anew = (anew or set()) | ({"allocation"} if self._leaderless else set())
         memory = {
             layer: fresh
-            if layer in (anew or ())
+            if layer in anew
             else self._parts[layer].carry_over(
                 getattr(old.circuit.wires, layer).memory, fresh, places
             )
@@ -302,7 +304,7 @@ class Flight:
         bus.thrusts[new] = team.masses[new] * team.gravity
         if bus.reeled.any():
             self._rebind()
-        if _is_driven(self._parts["reference"]) and "reference" not in (anew or ()):
+        if _is_driven(self._parts["reference"]) and "reference" not in anew:
             wires = self.wires.reference.writes, old.circuit.wires.reference.writes
             for now, before in zip(*wires, strict=True):
                 if now.shape == before.shape:
@@ -589,10 +591,21 @@ class Flight:
 
     def _fresh_memory(self, drones: list[int], start: Start) -> dict[str, Vector]:
         team = self._team(drones)
-        memory = {layer: self._parts[layer].memory(team) for layer in LAYERS[:-1]}
+        memory = {layer: self._memory(layer, self._parts[layer], team) for layer in LAYERS[:-1]}
         true = self.mission.true_bodies.of(drones)
         real = replace(team, cable_lengths=true.cable_lengths, body=true.body)
         return {**memory, "plant": self.mission.plant.initial(real, start)}
+
+    def _memory(self, layer: str, part: Part, team: Team) -> Vector:
+        """What a part remembers at first; of an allocator that each drone asks for itself, one after the other."""
+        each = layer == "allocation" and self._leaderless
+        return np.tile(part.memory(team), team.n if each else 1)
+
+    @property
+    def _leaderless(self) -> bool:
+        agents = self._parts["agents"]
+        assert isinstance(agents, AgentPart)
+        return agents.decides
 
     def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
         """From here on these drones of the mission fly; every layer is bound to their team."""

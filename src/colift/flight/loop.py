@@ -53,7 +53,7 @@ Common = named_tuple(
         "reference_attitude", "reference_rates", "nominal_forces", "attachments",
         "estimated_load", "estimated_load_attitude", "estimated_load_rates", "estimated_ends", "wanted_ends", "reference_shift",
         "lift_share", "unhooked", "attached", "winches", "reeled",
-        *(name for name in agents.SIGNALS if name != "carrying"),
+        *(name for name in agents.SIGNALS if name not in {"carrying", "reference"}),
     ],
     __name__,
 )  # fmt: skip
@@ -185,7 +185,10 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             if leaderless:  # nobody answers for all: what an allocator says of itself is not known
                 begin = monotonic_ns()
                 cycle = k // every.allocation
-                _decide(wires.network, wires.agents, bus, cycle, t, every.allocation * dt)
+                _decide(
+                    wires.network, wires.agents, wires.allocation, bus, cycle, t,
+                    every.allocation * dt,
+                )  # fmt: skip
                 end = monotonic_ns()
                 cycles[row, :] = np.nan
                 cycles[row, 1 + INFO_SIZE] = (end - begin) * 1e-9

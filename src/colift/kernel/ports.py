@@ -251,10 +251,10 @@ PORTS: dict[str, Port] = {
             answers=True,
         ),
         Port("link", sees=("desired_tensions", "desired_directions")),
-        Port("network", sees=("outboxes",)),
+        Port("network", sees=("outboxes", "members")),
         Port(
             "agents",
-            sees=("wish", "steady_wish", "number", "members", "inbox", "heard", "evidence"),
+            sees=("wish", "steady_wish", "reference", "number", "members", "inbox", "heard", "evidence"),
             answers=True,
             table={signal.name: signal for signal in OF_ONE},
         ),

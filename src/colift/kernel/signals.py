@@ -186,6 +186,10 @@ MESSAGES = (
     Signal("outboxes", ("n", MESSAGE), "-", "-", "-", "message that each drone broadcasts", writer="agents", dtype=np.uint8),
     Signal("inboxes", ("n", "n", MESSAGE), "-", "-", "-", "newest message that each drone has of each", writer="network", dtype=np.uint8),
     Signal("heard", ("n", "n"), "1", "-", "-", "1 where a drone's message of another is new in this cycle", writer="network"),
+    Signal("asking", ("n",), "s", "-", "-", "time since its last question, of each drone that asks the allocator in this cycle", writer="agents"),
+    Signal("asked_forces", ("n", 3), "N", "-", "world", "total force for which it asks", writer="agents"),
+    Signal("team_tensions", ("n", "n"), "N", "-", "-", "of each drone's picture of the team the tensions: from where the allocator begins, then its answer", writer="agents"),
+    Signal("team_directions", ("n", "n", 3), "1", "-", "world", "the same of the directions", writer="agents"),
 )  # fmt: skip
 """Of a team without a leader; not recorded."""
 
@@ -217,12 +221,17 @@ OF_ONE = (
     Signal("steady_wish", (3,), "N", "-", "world", "the part of it that is not feedback of the moment"),
     Signal("number", (1,), "1", "-", "-", "this drone's number in the mission"),
     Signal("members", ("n",), "1", "-", "-", "the numbers of the team, in the order of what has one row a drone"),
+    Signal("reference", (4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives, by this drone's clock"),
     Signal("inbox", ("n", MESSAGE), "-", "-", "-", "newest message of each drone; the own row is not used", dtype=np.uint8),
     Signal("heard", ("n",), "1", "-", "-", "1 for each drone whose message is new"),
     Signal("evidence", ("n",), "1", "-", "-", "1 for each drone that is taken to carry"),
     Signal("tension", (1,), "N", "-", "-", "tension that this drone gives its cable", writer="agents"),
     Signal("direction", (3,), "1", "-", "world", "unit direction to the load that it gives it", writer="agents"),
     Signal("outbox", (MESSAGE,), "-", "-", "-", "message to all others", writer="agents", dtype=np.uint8),
+    Signal("asking", (1,), "s", "-", "-", "time since the last question, where the mission's allocator is to be asked; else 0. It has answered before the next cycle", writer="agents"),
+    Signal("asked_force", (3,), "N", "-", "world", "for which total force", writer="agents"),
+    Signal("team_tensions", ("n",), "N", "-", "-", "from which tensions of the team it begins; then its answer", writer="agents"),
+    Signal("team_directions", ("n", 3), "1", "-", "world", "the same of the directions", writer="agents"),
 )  # fmt: skip
 """What one drone's agent sees and writes: rows of signals of the bus (:mod:`colift.flight.agents`)."""
 

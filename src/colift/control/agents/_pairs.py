@@ -1,0 +1,153 @@
+"""What two drones have agreed on, so that their cables stay apart whatever is lost.
+
+Drone i keeps for each peer its own reference ``r0``, which the peer has adopted, at most one more, ``r1``, that it has offered, and
+``rb``, the peer's reference that it has adopted itself. Of two references the plane between them leaves each drone its side::
+
+    a_i . (r_i - r_j) >= sin(theta / 2) |r_i - r_j|
+
+Drone i obeys the planes of (r0, rb) and (r1, rb). What the peer has adopted of i is r0 or r1, and the other way
+round: so there is always one plane that both obey, and between the caps on its two sides is the angle theta.
+
+An offer is decided once: adopted if the drone stands on its side of every plane that would follow, else refused for good. Whoever
+knows nothing of a peer, at first or after a restart, stands still; what it offers then is marked as first.
+"""
+
+from __future__ import annotations
+
+from colift.control.agents._message import MOST, code_of, direction_of
+from colift.kernel.jit import inline
+from colift.kernel.layout import Layout
+
+PEER = Layout(
+    team={
+        "inside": 1, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
+        "state": 1, "version": 1, "code": 1, "r0": 3, "r1": 3, "reach": 1,
+        "known": 1, "rb": 3, "seen": 1, "yes": 1, "due": 1,
+    }
+)  # fmt: skip
+"""What a drone keeps of each peer. ``silent``: cycles since it was heard; ``reach``: share of the way to where it wants to be that is
+offered; ``seen``: version decided last; ``due``: it waits for an answer."""
+Q, WIDTH = PEER.at, PEER.size(0)
+SETTLED, OFFERED, FIRST = 0.0, 1.0, 2.0
+"""``state`` of the own reference: r1 is out only in the second."""
+APART = 1e-2
+"""Least distance of two references of a plane."""
+NEWS = 1e-2
+"""Least distance of a new reference from the one before, rad."""
+LEAST = 0.05
+"""A share of the way below this is none."""
+
+
+@inline
+def keeps(memory, a, p, q, least):  # type: ignore[no-untyped-def]
+    """Whether the direction at place ``a`` is on the side of ``p`` of the plane between the references at ``p`` and ``q``."""
+    along = square = 0.0
+    for k in range(3):
+        d = memory[p + k] - memory[q + k]
+        along += memory[a + k] * d
+        square += d * d
+    return square > APART * APART and along > 0.0 and along * along >= least * least * square
+
+
+@inline
+def stand(memory, o, a):  # type: ignore[no-untyped-def]
+    """Forget what was agreed with the peer at ``o``; offer the own direction at ``a`` as first."""
+    memory[o + Q.state] = FIRST
+    memory[o + Q.version] = (memory[o + Q.version] + 1.0) % 8
+    code = code_of(memory[a], memory[a + 1], memory[a + 2])
+    memory[o + Q.code] = code
+    x, y, z = direction_of(code)
+    memory[o + Q.r0], memory[o + Q.r0 + 1], memory[o + Q.r0 + 2] = x, y, z
+    memory[o + Q.reach] = 1.0
+    memory[o + Q.known] = 0.0
+    memory[o + Q.yes] = 0.0
+    memory[o + Q.due] = 1.0
+
+
+@inline
+def decide(memory, o, a, scratch, version, first, code, least):  # type: ignore[no-untyped-def]
+    """Take or refuse what the peer at ``o`` offers."""
+    known = memory[o + Q.known] != 0.0
+    if known and version == memory[o + Q.seen]:
+        if first != 0:  # our answer was lost
+            memory[o + Q.due] = 1.0
+        return
+    if known and first != 0:  # it has begun anew
+        stand(memory, o, a)
+        known = False
+    if not known and first == 0:
+        return
+    if known and version != (memory[o + Q.seen] + 1.0) % 8:
+        return
+    x, y, z = direction_of(code)
+    memory[scratch], memory[scratch + 1], memory[scratch + 2] = x, y, z
+    good = keeps(memory, a, o + Q.r0, scratch, least)
+    if memory[o + Q.state] == OFFERED:
+        good = good and keeps(memory, a, o + Q.r1, scratch, least)
+    memory[o + Q.due] = 1.0
+    if good:
+        for k in range(3):
+            memory[o + Q.rb + k] = memory[scratch + k]
+        memory[o + Q.known] = 1.0
+    elif not known:  # it stands there: nothing else will do
+        return
+    memory[o + Q.seen] = version
+    memory[o + Q.yes] = 1.0 if good else 0.0
+
+
+@inline
+def hear_answer(memory, o, first, answered, yes):  # type: ignore[no-untyped-def]
+    """The peer at ``o`` has decided on a version of ours; ``first`` is that of its own reference."""
+    state = memory[o + Q.state]
+    if state == SETTLED or answered != memory[o + Q.version]:
+        return
+    if (
+        state == FIRST
+    ):  # of what we have said since we stand here, not of what we said before a restart
+        if yes != 0 and (first != 0 or memory[o + Q.known] != 0.0):
+            memory[o + Q.state] = SETTLED
+        return
+    memory[o + Q.state] = SETTLED
+    if yes != 0:
+        memory[o + Q.reach] = 1.0
+        for k in range(3):
+            memory[o + Q.r0 + k] = memory[o + Q.r1 + k]
+    else:
+        memory[o + Q.reach] *= 0.5
+
+
+@inline
+def offer(memory, o, a, x, y, z, least):  # type: ignore[no-untyped-def]
+    """Offer the peer at ``o`` a reference at (x, y, z), if that is new and the direction at ``a`` obeys what follows."""
+    code = code_of(x, y, z)
+    x, y, z = direction_of(code)
+    square = 0.0
+    for k in range(3):
+        d = (x if k == 0 else y if k == 1 else z) - memory[o + Q.r0 + k]
+        square += d * d
+    if square < NEWS * NEWS:
+        return False
+    memory[o + Q.r1], memory[o + Q.r1 + 1], memory[o + Q.r1 + 2] = x, y, z
+    if not keeps(memory, a, o + Q.r1, o + Q.rb, least):
+        return False
+    memory[o + Q.code] = code
+    memory[o + Q.version] = (memory[o + Q.version] + 1.0) % 8
+    memory[o + Q.state] = OFFERED
+    memory[o + Q.due] = 1.0
+    return True
+
+
+@inline
+def allowed(memory, peers, a, least, cone):  # type: ignore[no-untyped-def]
+    """Whether the direction at place ``a`` is within the cone and on its side of all planes."""
+    if -memory[a + 2] < cone:
+        return False
+    for j in range(MOST):
+        o = peers + WIDTH * j
+        if memory[o + Q.inside] == 0.0 or memory[o + Q.known] == 0.0:
+            continue
+        if not keeps(memory, a, o + Q.r0, o + Q.rb, least):
+            return False
+        if memory[o + Q.state] == OFFERED and not keeps(memory, a, o + Q.r1, o + Q.rb, least):
+            return False
+    return True

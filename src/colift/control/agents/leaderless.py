@@ -1,0 +1,447 @@
+"""n equal agents: each bears its own share of what all want, inside planes that two agree on at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from colift.control.agents import _frame as frame
+from colift.control.agents import _message as message
+from colift.control.agents import _pairs as pairs
+from colift.control.agents._message import MOST
+from colift.control.agents._pairs import FIRST, LEAST, OFFERED, SETTLED, WIDTH, Q
+from colift.control.agents.base import SIGNATURE, AgentPart, Status
+from colift.kernel.jit import inline, kernel
+from colift.kernel.layout import Layout
+from colift.part import Vector
+from colift.team import Team
+
+PARAMS = Layout(
+    team={
+        "g": 1, "least": 1, "cone": 1, "rate": 1, "settling": 1, "patience": 1, "period": 1, "unit": 1,
+        "key": 2,
+    },
+    drone={"low": 1, "high": 1},
+)  # fmt: skip
+"""``least``: sine of half of the angle that pairs keep; ``cone``: cosine of the largest lean; ``unit``: N in one step of a message."""
+MEMORY = Layout(
+    drone={
+        "started": 1, "asked": 1, "planned": 1, "turn": 1, "session": 1, "up": 3, "a": 3, "w": 3, "b": 3,
+        "target": 3, "mean": 3, "wish": 3, "steady": 3, "peers": WIDTH * MOST,
+    }
+)  # fmt: skip
+"""``up``: axis of the planned frame, ``a``: direction in it, ``b``: pull beside the share of the wish, ``target``: where the plan of the formation
+wants it, ``mean``: mean of the steady wishes; ``turn``: peer that was written to last; ``w``: scratch."""
+P, M = PARAMS.at, MEMORY.at
+AHEAD = 0.3
+"""Largest distance of an offered reference from the own direction, rad."""
+ROUNDS = 3
+"""How often the wanted direction is pushed back inside of all planes."""
+HALVINGS = 5
+FREE, HOLDING, CLIPPED = int(Status.FREE), int(Status.HOLDING), int(Status.CLIPPED)
+
+
+@inline
+def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def]
+    """Stand where the cable is: with an equal share at the start, with none when joining."""
+    memory[M.started] = 1.0
+    memory[M.up], memory[M.up + 1], memory[M.up + 2] = 0.0, 0.0, 1.0
+    plan = sees.reference
+    frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], math.pi)
+    d = writes.direction
+    x, y, z = frame.to_frame(memory, M.up, d[0], d[1], d[2])
+    memory[M.a], memory[M.a + 1], memory[M.a + 2] = x, y, z
+    F = sees.wish
+    wx, wy, wz = 0.0, 0.0, 0.0
+    if math.isfinite(F[0] + F[1] + F[2]):
+        wx, wy, wz = frame.to_frame(memory, M.up, F[0], F[1], F[2])
+    pull = 0.0
+    if now.step == 0 and z < -0.1:
+        pull = -wz / (n * z)
+    for k in range(3):
+        memory[M.wish + k] = memory[M.steady + k] = 0.0
+        memory[M.b + k] = pull * memory[M.a + k] + (wx if k == 0 else wy if k == 1 else wz) / n
+    for j in range(MOST):
+        memory[M.peers + WIDTH * j + Q.count] = -1.0
+
+
+@inline
+def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
+    """Take what is new, sealed and fresh of those in the team."""
+    key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
+    unit = params[P.unit]
+    for row in range(n):
+        j = int(sees.members[row])
+        if row == me or j < 0 or j >= MOST:
+            continue
+        o = M.peers + WIDTH * j
+        memory[o + Q.silent] += 1.0
+        if sees.heard[row] == 0.0:
+            continue
+        text = sees.inbox[row]
+        count = message.count_near(message.get16(text, message.COUNT), now.step)
+        if count <= memory[o + Q.count] or int(text[message.WHO]) & 15 != j:
+            continue
+        if not message.is_sealed(text, (count >> 16) & 0xFFFFFFFF, key_0, key_1):
+            continue
+        memory[o + Q.count] = count
+        memory[o + Q.silent] = 0.0
+        session = (int(text[message.WHO]) >> 4) & 3
+        if session != memory[o + Q.session]:
+            memory[o + Q.session] = session
+            if memory[o + Q.inside] != 0.0:
+                pairs.stand(memory, o, M.a)
+        for k in range(3):
+            wish = message.get16(text, message.WISH + 2 * k)
+            share = message.get16(text, message.SHARE + 2 * k)
+            memory[o + Q.wish + k] = unit * (wish - 65536 * (wish >> 15))
+            memory[o + Q.share + k] = unit * (share - 65536 * (share >> 15))
+        if memory[o + Q.inside] == 0.0:
+            continue
+        for half in range(2):
+            peer, version, first, answered, yes, code = message.get_pair(
+                text, message.PAIRS + message.PAIR * half
+            )
+            if peer == int(sees.number[0]):
+                pairs.decide(memory, o, M.a, M.w, version, first, code, params[P.least])
+                pairs.hear_answer(memory, o, first, answered, yes)
+
+
+@inline
+def _view(sees, memory, me, n, late, started):  # type: ignore[no-untyped-def]
+    """Who is in the team: silence alone lets nobody out. Returns how many, with this drone."""
+    count = 1
+    for j in range(MOST):
+        count += int(memory[M.peers + WIDTH * j + Q.inside])
+    for j in range(MOST):
+        o = M.peers + WIDTH * j
+        there = False
+        for row in range(n):
+            if row != me and int(sees.members[row]) == j:
+                here = memory[o + Q.inside] != 0.0 and memory[o + Q.silent] <= late
+                there = sees.evidence[row] != 0.0 or here
+        if there and memory[o + Q.inside] == 0.0:
+            memory[o + Q.inside] = 1.0
+            pairs.stand(memory, o, M.a)
+            memory[o + Q.silent] = 0.0
+            for k in range(3):
+                if memory[o + Q.count] < 0.0:
+                    memory[o + Q.wish + k] = memory[M.steady + k]
+                if started:  # it begins with nothing: what we bear stays
+                    memory[M.b + k] -= memory[M.mean + k] / (count * (count + 1))
+            count += 1
+            memory[M.planned] = 0.0
+        elif not there and memory[o + Q.inside] != 0.0:
+            memory[o + Q.inside] = 0.0
+            for k in range(3):  # each takes its part of what is missing
+                memory[M.b + k] += memory[o + Q.share + k] / (count - 1)
+            count -= 1
+            memory[M.planned] = 0.0
+    return count
+
+
+@inline
+def _push_in(memory, params, x, y, z):  # type: ignore[no-untyped-def]
+    """The direction (x, y, z), pushed to the near side of every plane that it is beyond, and into the cone."""
+    sine = params[P.least] + 1e-6
+    cosine = math.sqrt(1.0 - sine * sine)
+    for _ in range(ROUNDS):
+        moved = False
+        for m in range(2 * MOST + 1):
+            o = M.peers + WIDTH * (m >> 1)
+            nx, ny, nz, least, rest = 0.0, 0.0, -1.0, params[P.cone] + 1e-6, 0.0
+            if m < 2 * MOST:
+                if memory[o + Q.inside] == 0.0 or memory[o + Q.known] == 0.0:
+                    continue
+                if m & 1 == 1 and memory[o + Q.state] != OFFERED:
+                    continue
+                r = o + Q.r0 if m & 1 == 0 else o + Q.r1
+                nx = memory[r] - memory[o + Q.rb]
+                ny = memory[r + 1] - memory[o + Q.rb + 1]
+                nz = memory[r + 2] - memory[o + Q.rb + 2]
+                norm = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
+                nx, ny, nz, least, rest = nx * norm, ny * norm, nz * norm, sine, cosine
+            else:
+                rest = math.sqrt(max(1.0 - least * least, 0.0))
+            along = x * nx + y * ny + z * nz
+            if along >= least:
+                continue
+            moved = True
+            tx, ty, tz = x - along * nx, y - along * ny, z - along * nz
+            size = math.sqrt(tx * tx + ty * ty + tz * tz)
+            if size < 1e-9:
+                return memory[M.a], memory[M.a + 1], memory[M.a + 2]
+            share = rest / size
+            x, y, z = least * nx + share * tx, least * ny + share * ty, least * nz + share * tz
+        if not moved:
+            break
+    norm = 1.0 / math.sqrt(x * x + y * y + z * z)
+    return x * norm, y * norm, z * norm
+
+
+@inline
+def _move(memory, params, x, y, z, most):  # type: ignore[no-untyped-def]
+    """Turn towards the unit vector (x, y, z) as far as all planes allow; where it stands is always allowed."""
+    for j in range(MOST):
+        o = M.peers + WIDTH * j
+        if memory[o + Q.inside] != 0.0 and memory[o + Q.known] == 0.0:
+            return False
+    x, y, z = _push_in(memory, params, x, y, z)
+    angle = most
+    for _ in range(HALVINGS):
+        for k in range(3):
+            memory[M.w + k] = memory[M.a + k]
+        frame.turn_to(memory, M.w, x, y, z, angle)
+        if pairs.allowed(memory, M.peers, M.w, params[P.least], params[P.cone]):
+            for k in range(3):
+                memory[M.a + k] = memory[M.w + k]
+            return True
+        angle *= 0.5
+    return False
+
+
+@inline
+def _offer(memory, params, x, y, z):  # type: ignore[no-untyped-def]
+    """Offer every peer that has answered a reference on the way to where we want to be."""
+    for j in range(MOST):
+        o = M.peers + WIDTH * j
+        ready = memory[o + Q.inside] != 0.0 and memory[o + Q.known] != 0.0
+        if not ready or memory[o + Q.state] != SETTLED:
+            continue
+        for k in range(3):
+            memory[M.w + k] = memory[M.a + k]
+        reach = memory[o + Q.reach]
+        if reach > LEAST:
+            c = memory[M.a] * x + memory[M.a + 1] * y + memory[M.a + 2] * z
+            way = math.acos(min(max(c, -1.0), 1.0))
+            frame.turn_to(memory, M.w, x, y, z, reach * min(way, AHEAD))
+        w, a, least = M.w, M.a, params[P.least]
+        if not pairs.offer(memory, o, a, memory[w], memory[w + 1], memory[w + 2], least):
+            pairs.offer(memory, o, a, memory[a], memory[a + 1], memory[a + 2], least)
+        if reach <= LEAST:
+            memory[o + Q.reach] = 1.0
+
+
+@inline
+def _next_peer(memory, turn):  # type: ignore[no-untyped-def]
+    """Who is written to after the peer ``turn``: the next that waits for something, else the next; -1 if there is none."""
+    found = -1
+    for k in range(1, MOST + 1):
+        j = (turn + k) % MOST
+        o = M.peers + WIDTH * j
+        if memory[o + Q.inside] == 0.0:
+            continue
+        if memory[o + Q.due] != 0.0 or memory[o + Q.state] != SETTLED:
+            return j
+        if found < 0:
+            found = j
+    return found
+
+
+@inline
+def _speak(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    text = writes.outbox
+    number, unit = int(sees.number[0]), params[P.unit]
+    text[message.WHO] = number | int(memory[M.session]) << 4
+    message.put16(text, message.COUNT, now.step & 0xFFFF)
+    team = 1 << number
+    for j in range(MOST):
+        team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
+    message.put16(text, message.TEAM, team)
+    for k in range(3):
+        wish, share = memory[M.steady + k] / unit, memory[M.b + k] / unit
+        wish, share = min(max(wish, -32767.0), 32767.0), min(max(share, -32767.0), 32767.0)
+        message.put16(text, message.WISH + 2 * k, math.floor(wish + 0.5) & 0xFFFF)
+        message.put16(text, message.SHARE + 2 * k, math.floor(share + 0.5) & 0xFFFF)
+    for half in range(2):
+        at = message.PAIRS + message.PAIR * half
+        j = _next_peer(memory, int(memory[M.turn]))
+        if j < 0:
+            message.put_pair(text, at, number, 0, 0, 0, 0, 0)
+            continue
+        memory[M.turn] = j
+        o = M.peers + WIDTH * j
+        memory[o + Q.due] = 0.0
+        first = 1 if memory[o + Q.state] == FIRST else 0
+        message.put_pair(
+            text, at, j, int(memory[o + Q.version]), first, int(memory[o + Q.seen]),
+            int(memory[o + Q.yes]), int(memory[o + Q.code]),
+        )  # fmt: skip
+    key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
+    message.seal(text, (now.step >> 16) & 0xFFFFFFFF, key_0, key_1)
+
+
+@inline
+def _ask(sees, memory, writes, me, n, since):  # type: ignore[no-untyped-def]
+    """Ask for the formation of all for the mean wish, from what is known of everybody's pull."""
+    m, b = M.mean, M.b
+    writes.asking[0] = since
+    memory[M.asked] = 1.0
+    x, y, z = frame.to_world(memory, M.up, memory[m], memory[m + 1], memory[m + 2])
+    writes.asked_force[0], writes.asked_force[1], writes.asked_force[2] = x, y, z
+    for row in range(n):
+        o = b if row == me else M.peers + WIDTH * int(sees.members[row]) + Q.share
+        x, y, z = (
+            memory[o] - memory[m] / n,
+            memory[o + 1] - memory[m + 1] / n,
+            memory[o + 2] - memory[m + 2] / n,
+        )
+        x, y, z = frame.to_world(memory, M.up, x, y, z)
+        size = math.sqrt(x * x + y * y + z * z)
+        writes.team_tensions[row] = size
+        if size > 1e-6:
+            writes.team_directions[row, 0] = x / size
+            writes.team_directions[row, 1] = y / size
+            writes.team_directions[row, 2] = z / size
+
+
+@kernel(SIGNATURE, counted=False)
+def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    n, dt = sees.members.shape[0], now.dt
+    me = 0
+    for row in range(n):
+        if sees.members[row] == sees.number[0]:
+            me = row
+    started = memory[M.started] != 0.0
+    if not started:
+        _begin(now, sees, params, memory, writes, n)
+
+    # What the last question was answered, in the frame in which it was asked.
+    if memory[M.asked] != 0.0:
+        memory[M.asked] = 0.0
+        T, d = writes.team_tensions[me], writes.team_directions
+        x, y, z = frame.to_frame(memory, M.up, T * d[me, 0], T * d[me, 1], T * d[me, 2])
+        if math.isfinite(x + y + z):
+            memory[M.planned] = 1.0
+            memory[M.target] = x + memory[M.mean] / n
+            memory[M.target + 1] = y + memory[M.mean + 1] / n
+            memory[M.target + 2] = z + memory[M.mean + 2] / n
+
+    most = params[P.rate] * dt
+    plan = sees.reference
+    frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], most)
+    F = sees.wish
+    if math.isfinite(F[0] + F[1] + F[2]):
+        x, y, z = frame.to_frame(memory, M.up, F[0], F[1], F[2])
+        memory[M.wish], memory[M.wish + 1], memory[M.wish + 2] = x, y, z
+    F = sees.steady_wish
+    if math.isfinite(F[0] + F[1] + F[2]):
+        x, y, z = frame.to_frame(memory, M.up, F[0], F[1], F[2])
+        memory[M.steady], memory[M.steady + 1], memory[M.steady + 2] = x, y, z
+
+    _listen(now, sees, params, memory, me, n)
+    late = params[P.patience] / dt
+    team = _view(sees, memory, me, n, late, started)
+
+    holding = False
+    for k in range(3):
+        memory[M.mean + k] = memory[M.steady + k]
+    for j in range(MOST):
+        o = M.peers + WIDTH * j
+        if memory[o + Q.inside] == 0.0:
+            continue
+        if memory[o + Q.silent] > late or memory[o + Q.known] == 0.0:
+            holding = True
+        for k in range(3):
+            memory[M.mean + k] += memory[o + Q.wish + k]
+    for k in range(3):
+        memory[M.mean + k] /= team
+    if memory[M.planned] != 0.0 and not holding:
+        follow = dt / (dt + params[P.settling])
+        for k in range(3):
+            memory[M.b + k] += follow * (memory[M.target + k] - memory[M.b + k])
+
+    # f = b - F / |V|
+    x, y, z = (
+        memory[M.b] - memory[M.wish] / team,
+        memory[M.b + 1] - memory[M.wish + 1] / team,
+        memory[M.b + 2] - memory[M.wish + 2] / team,
+    )
+    size = math.sqrt(x * x + y * y + z * z)
+    if size > 1e-9:
+        _move(memory, params, x / size, y / size, z / size, most)
+        _offer(memory, params, x / size, y / size, z / size)
+    a = M.a
+    row = P.rows + P.width * me
+    along = x * memory[a] + y * memory[a + 1] + z * memory[a + 2]
+    T = min(max(along, params[row + P.low]), params[row + P.high])
+    writes.tension[0] = T
+    missing = 0.0
+    for k in range(3):
+        missing = max(missing, abs((x if k == 0 else y if k == 1 else z) - T * memory[a + k]))
+    x, y, z = frame.to_world(memory, M.up, memory[a], memory[a + 1], memory[a + 2])
+    writes.direction[0], writes.direction[1], writes.direction[2] = x, y, z
+
+    _speak(now, sees, params, memory, writes)
+    writes.asking[0] = 0.0
+    period = max(1, int(params[P.period] / dt + 0.5))
+    if team == n and n > 1 and not holding and now.step % period == 0:
+        _ask(sees, memory, writes, me, n, period * dt)
+    return (HOLDING if holding else FREE) | (CLIPPED if missing > 1e-3 * size else FREE)
+
+
+Force = Annotated[float, Field(gt=0.0, le=1e6)]
+
+
+class Leaderless(AgentPart):
+    """Each drone bears its own pull beside an equal share of the wanted force, and turns only inside planes agreed with each other drone.
+
+    The formation follows the answers of the mission's allocator, which each drone asks for itself; its limits, such as
+    ``min_angle_deg``, should be narrower than those here, which hold whatever is lost.
+    """
+
+    kernel = _agree
+    remembers = MEMORY
+    per_drone = ("tension_min", "tension_max")
+    from_team: ClassVar[Mapping[str, float | None]] = {"tension_min": 0.05, "tension_max": 5.0}
+
+    min_angle_deg: Annotated[float, Field(gt=0.0, lt=120.0)] = 25.0
+    """Least angle between any two cables, degrees, whatever is lost."""
+    frame_deg: Annotated[float, Field(ge=0.0, le=30.0)] = 1.0
+    """By how much the frames of two drones may differ, degrees: the fastest turn of the planned force times the largest difference of
+    their clocks. Cables keep so much more."""
+    max_cone_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = 75.0
+    """Largest angle between a cable and the planned force, degrees."""
+    max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 6.0
+    """Fastest turn of a cable's direction in the planned frame, rad/s."""
+    tension_min: Force | list[Force] | None = None
+    """Least tension, N; one value, or one per cable. None: half of a cable's share of the load's weight where
+    ``drones.max_thrust`` is known, else 0.05."""
+    tension_max: Force | list[Force] | None = None
+    """Largest tension, N; one value, or one per cable. None: what 0.95 of ``drones.max_thrust`` lifts beside the drone,
+    or 5."""
+    settling: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
+    """Time with which the own pull follows what the formation wants, s."""
+    patience: Annotated[float, Field(gt=0.0, le=10.0)] = 0.15
+    """Time after which somebody who is not heard is taken for silent, s."""
+    period: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
+    """Time between two questions to the allocator, s."""
+    key: Annotated[str, Field(pattern="^[0-9a-f]{16}$")] = "0" * 16
+    """Secret of the team, 16 hexadecimal digits: a message without its seal is not heard."""
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        few = team.n <= MOST
+        return super().check(team) + [("kind", f"is for {MOST} drones at most")] * (not few)
+
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        known = np.isfinite(team.max_thrusts)
+        low = 0.5 * team.load_mass * max(team.gravity, 1e-3) / team.n
+        lifts = 0.95 * team.max_thrusts - team.masses * team.gravity
+        return {
+            "tension_min": np.where(known, low, math.nan),
+            "tension_max": np.where(known, np.maximum(lifts, 1.2 * low), math.nan),
+        }
+
+    def params(self, team: Team) -> Vector:
+        keep = math.radians(min(self.min_angle_deg + self.frame_deg, 150.0))
+        weight = team.load_mass * max(team.gravity, 1e-3)
+        return PARAMS.pack(
+            team.n, g=team.gravity, least=math.sin(0.5 * keep), cone=math.cos(math.radians(self.max_cone_deg)), rate=self.max_rate,
+            settling=self.settling, patience=self.patience, period=self.period,
+            unit=4.0 * weight / 32767.0, key=(int(self.key[8:], 16), int(self.key[:8], 16)),
+            low=self.settled("tension_min", team), high=self.settled("tension_max", team),
+        )  # fmt: skip
