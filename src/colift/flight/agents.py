@@ -15,10 +15,10 @@ from colift.kernel.ports import PORTS, Wire
 
 Sees, Writes = PORTS["agents"].Sees, PORTS["agents"].Writes
 Asked, Answers = PORTS["allocation"].Sees, PORTS["allocation"].Writes
-_agree, _carry, _plan = (PORTS[name].invoke for name in ("agents", "network", "allocation"))
+_agree, carry, _plan = (PORTS[name].invoke for name in ("agents", "network", "allocation"))
 
 SIGNALS = (
-    "force", "steady_force", "reference", "members", "inboxes", "heard", "carrying", "desired_tensions",
+    "force", "steady_force", "reference", "wishes", "steady_wishes", "plans", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
     "desired_directions", "outboxes", "asking", "asked_forces", "team_tensions", "team_directions",
     "agent_status", "received_tensions", "received_directions",
 )  # fmt: skip
@@ -29,7 +29,7 @@ SIGNALS = (
 def rows_of(bus, i):  # type: ignore[no-untyped-def]
     """What drone i sees and what it writes."""
     sees = Sees(
-        bus.force, bus.steady_force, bus.reference, bus.members[i : i + 1], bus.members, bus.inboxes[i],
+        bus.wishes[i], bus.steady_wishes[i], bus.plans[i], bus.members[i : i + 1], bus.members, bus.inboxes[i],
         bus.heard[i], bus.carrying,
     )  # fmt: skip
     writes = Writes(
@@ -37,6 +37,17 @@ def rows_of(bus, i):  # type: ignore[no-untyped-def]
         bus.asking[i : i + 1], bus.asked_forces[i], bus.team_tensions[i], bus.team_directions[i],
     )  # fmt: skip
     return sees, writes
+
+
+@register_jitable
+def wish_alike(bus):  # type: ignore[no-untyped-def]
+    """Let all drones want what the one load controller wants, by one clock."""
+    for i in range(bus.members.shape[0]):
+        for k in range(3):
+            bus.wishes[i, k] = bus.force[k]
+            bus.steady_wishes[i, k] = bus.steady_force[k]
+            for m in range(4):
+                bus.plans[i, m, k] = bus.reference[m, k]
 
 
 @register_jitable
@@ -57,21 +68,27 @@ def ask_for(allocation, bus, i, cycle, time, dt):  # type: ignore[no-untyped-def
 
 
 @register_jitable
+def decide_one(agents, allocation, bus, i, cycle, time, dt):  # type: ignore[no-untyped-def]
+    """Let drone i decide by its own clock, and ask the allocator what it wants to know."""
+    width = agents.memory.shape[0] // bus.members.shape[0]
+    sees, writes = rows_of(bus, i)
+    own = agents.memory[width * i : width * (i + 1)]
+    wire = Wire(agents.kernel, agents.key, agents.params, own, sees, writes)
+    ahead = int(bus.clock_errors[i])
+    bus.agent_status[i] = _agree(wire, cycle + ahead, time + ahead * dt, dt)
+    if bus.asking[i] != 0.0:
+        ask_for(allocation, bus, i, cycle, time, bus.asking[i])
+    bus.received_tensions[i] = bus.desired_tensions[i]
+    for k in range(3):
+        bus.received_directions[i, k] = bus.desired_directions[i, k]
+
+
+@register_jitable
 def decide(network, agents, allocation, bus, cycle, time, dt):  # type: ignore[no-untyped-def]
     """Carry what the drones said in the last cycle; let each decide and fly what it decides at once."""
-    _carry(network, cycle, time, dt)
-    n = bus.members.shape[0]
-    width = agents.memory.shape[0] // n
-    for i in range(n):
-        sees, writes = rows_of(bus, i)
-        own = agents.memory[width * i : width * (i + 1)]
-        wire = Wire(agents.kernel, agents.key, agents.params, own, sees, writes)
-        bus.agent_status[i] = _agree(wire, cycle, time, dt)
-        if bus.asking[i] != 0.0:
-            ask_for(allocation, bus, i, cycle, time, bus.asking[i])
-        bus.received_tensions[i] = bus.desired_tensions[i]
-        for k in range(3):
-            bus.received_directions[i, k] = bus.desired_directions[i, k]
+    carry(network, cycle, time, dt)
+    for i in range(bus.members.shape[0]):
+        decide_one(agents, allocation, bus, i, cycle, time, dt)
 
 
 def first_of(signals: dict[str, Any]) -> dict[str, Any]:

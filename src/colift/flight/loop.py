@@ -98,7 +98,7 @@ _control_position = PORTS["position_control"].invoke
 _control_attitude = PORTS["attitude_control"].invoke
 _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
 _disturb = PORTS["disturbance"].invoke
-_decide = agents.decide
+_wish_alike, _decide = agents.wish_alike, agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
@@ -185,6 +185,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             if leaderless:  # nobody answers for all: what an allocator says of itself is not known
                 begin = monotonic_ns()
                 cycle = k // every.allocation
+                _wish_alike(bus)
                 _decide(
                     wires.network, wires.agents, wires.allocation, bus, cycle, t,
                     every.allocation * dt,

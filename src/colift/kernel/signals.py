@@ -182,6 +182,10 @@ MESSAGE = 30
 
 MESSAGES = (
     Signal("steady_force", (3,), "N", "-", "world", "part of the wanted force that is not feedback of the moment: planned and learned", writer="load_control"),
+    Signal("wishes", ("n", 3), "N", "-", "world", "total force on the load that each drone wants"),
+    Signal("steady_wishes", ("n", 3), "N", "-", "world", "the part of each that is not feedback of the moment"),
+    Signal("plans", ("n", 4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives, by each drone's clock"),
+    Signal("clock_errors", ("n",), "1", "-", "-", "cycles by which each drone's clock is ahead"),
     Signal("members", ("n",), "1", "-", "-", "number in the mission of each drone that flies"),
     Signal("outboxes", ("n", MESSAGE), "-", "-", "-", "message that each drone broadcasts", writer="agents", dtype=np.uint8),
     Signal("inboxes", ("n", "n", MESSAGE), "-", "-", "-", "newest message that each drone has of each", writer="network", dtype=np.uint8),

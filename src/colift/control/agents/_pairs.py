@@ -8,11 +8,14 @@ Drone i keeps for each peer its own reference ``r0``, which the peer has adopted
 Drone i obeys the planes of (r0, rb) and (r1, rb). What the peer has adopted of i is r0 or r1, and the other way
 round: so there is always one plane that both obey, and between the caps on its two sides is the angle theta.
 
-An offer is decided once: adopted if the drone stands on its side of every plane that would follow, else refused for good. Whoever
-knows nothing of a peer, at first or after a restart, stands still; what it offers then is marked as first.
+An offer is decided once: adopted if the drone is on its side of every plane that would follow, else refused for good. Whoever
+knows nothing of a peer, at first or after a restart, stands still; what it offers then is marked as first, and is adopted
+however near it is. A drone beyond a plane, as one that begins too near, may only come closer to it.
 """
 
 from __future__ import annotations
+
+import math
 
 from colift.control.agents._message import MOST, code_of, direction_of
 from colift.kernel.jit import inline
@@ -39,14 +42,37 @@ LEAST = 0.05
 
 
 @inline
-def keeps(memory, a, p, q, least):  # type: ignore[no-untyped-def]
-    """Whether the direction at place ``a`` is on the side of ``p`` of the plane between the references at ``p`` and ``q``."""
+def _apart(memory, p, q):  # type: ignore[no-untyped-def]
+    """Whether two references leave a plane between them."""
+    square = 0.0
+    for k in range(3):
+        d = memory[p + k] - memory[q + k]
+        square += d * d
+    return square > APART * APART
+
+
+@inline
+def side(memory, a, p, q):  # type: ignore[no-untyped-def]
+    """Height of the direction at place ``a`` over the plane between the references at ``p`` and ``q``, towards ``p``."""
     along = square = 0.0
     for k in range(3):
         d = memory[p + k] - memory[q + k]
         along += memory[a + k] * d
         square += d * d
-    return square > APART * APART and along > 0.0 and along * along >= least * least * square
+    return along / math.sqrt(max(square, 1e-12))
+
+
+@inline
+def keeps(memory, a, p, q, least):  # type: ignore[no-untyped-def]
+    """Whether the direction at place ``a`` is on its own side of that plane."""
+    return _apart(memory, p, q) and side(memory, a, p, q) >= least
+
+
+@inline
+def _no_worse(memory, w, a, p, q, least):  # type: ignore[no-untyped-def]
+    """The same of one at place ``w``, or that it is no farther beyond than that at ``a``."""
+    height = side(memory, w, p, q)
+    return height >= least or height >= side(memory, a, p, q)
 
 
 @inline
@@ -81,9 +107,12 @@ def decide(memory, o, a, scratch, version, first, code, least):  # type: ignore[
         return
     x, y, z = direction_of(code)
     memory[scratch], memory[scratch + 1], memory[scratch + 2] = x, y, z
-    good = keeps(memory, a, o + Q.r0, scratch, least)
-    if memory[o + Q.state] == OFFERED:
-        good = good and keeps(memory, a, o + Q.r1, scratch, least)
+    if known:
+        good = keeps(memory, a, o + Q.r0, scratch, least)
+        if memory[o + Q.state] == OFFERED:
+            good = good and keeps(memory, a, o + Q.r1, scratch, least)
+    else:
+        good = _apart(memory, o + Q.r0, scratch)
     memory[o + Q.due] = 1.0
     if good:
         for k in range(3):
@@ -138,16 +167,18 @@ def offer(memory, o, a, x, y, z, least):  # type: ignore[no-untyped-def]
 
 
 @inline
-def allowed(memory, peers, a, least, cone):  # type: ignore[no-untyped-def]
-    """Whether the direction at place ``a`` is within the cone and on its side of all planes."""
-    if -memory[a + 2] < cone:
+def allowed(memory, peers, w, a, least, cone):  # type: ignore[no-untyped-def]
+    """Whether the direction at place ``w`` is within the cone and on its side of all planes, or no worse than that at ``a``."""
+    if -memory[w + 2] < min(cone, -memory[a + 2]):
         return False
     for j in range(MOST):
         o = peers + WIDTH * j
         if memory[o + Q.inside] == 0.0 or memory[o + Q.known] == 0.0:
             continue
-        if not keeps(memory, a, o + Q.r0, o + Q.rb, least):
+        if not _no_worse(memory, w, a, o + Q.r0, o + Q.rb, least):
             return False
-        if memory[o + Q.state] == OFFERED and not keeps(memory, a, o + Q.r1, o + Q.rb, least):
+        if memory[o + Q.state] == OFFERED and not _no_worse(
+            memory, w, a, o + Q.r1, o + Q.rb, least
+        ):
             return False
     return True

@@ -22,27 +22,43 @@ from colift.team import Team
 
 PARAMS = Layout(
     team={
-        "g": 1, "least": 1, "cone": 1, "rate": 1, "settling": 1, "patience": 1, "period": 1, "unit": 1,
+        "g": 1, "least": 1, "cone": 1, "rate": 1, "settling": 1, "patience": 1, "stale": 1, "period": 1, "wish_unit": 1, "share_unit": 1,
         "key": 2,
     },
     drone={"low": 1, "high": 1},
 )  # fmt: skip
-"""``least``: sine of half of the angle that pairs keep; ``cone``: cosine of the largest lean; ``unit``: N in one step of a message."""
+"""``least``: sine of half of the angle that pairs keep; ``cone``: cosine of the largest lean; ``wish_unit``, ``share_unit``: N in one step of a message."""
 MEMORY = Layout(
     drone={
         "started": 1, "asked": 1, "planned": 1, "turn": 1, "session": 1, "up": 3, "a": 3, "w": 3, "b": 3,
-        "target": 3, "mean": 3, "wish": 3, "steady": 3, "peers": WIDTH * MOST,
+        "target": 3, "mean": 3, "wish": 3, "steady": 3, "said": 6, "flown": 3, "peers": WIDTH * MOST,
     }
 )  # fmt: skip
 """``up``: axis of the planned frame, ``a``: direction in it, ``b``: pull beside the share of the wish, ``target``: where the plan of the formation
-wants it, ``mean``: mean of the steady wishes; ``turn``: peer that was written to last; ``w``: scratch."""
+wants it, ``mean``: mean of the steady wishes; ``flown``: ``b`` of what is flown in truth; ``said``: own
+wish and pull as the others hear them, so that all see the same; ``turn``: peer that was written to last; ``w``: scratch."""
 P, M = PARAMS.at, MEMORY.at
 AHEAD = 0.3
 """Largest distance of an offered reference from the own direction, rad."""
 ROUNDS = 3
 """How often the wanted direction is pushed back inside of all planes."""
 HALVINGS = 5
+CODE = 0.1
+"""By how much two directions may be nearer, degrees, than the nearest codes for them."""
+WISHES, SHARES = 4.0, 1.0
+"""Largest wish and pull beside its share that a message can say, in weights of the load."""
 FREE, HOLDING, CLIPPED = int(Status.FREE), int(Status.HOLDING), int(Status.CLIPPED)
+
+
+@inline
+def _take(memory, at, F, most):  # type: ignore[no-untyped-def]
+    """A force in the frame, no larger than a message can say; the one before where it is no number."""
+    if math.isfinite(F[0] + F[1] + F[2]):
+        x, y, z = frame.to_frame(
+            memory, M.up, min(max(F[0], -most), most), min(max(F[1], -most), most),
+            min(max(F[2], -most), most),
+        )  # fmt: skip
+        memory[at], memory[at + 1], memory[at + 2] = x, y, z
 
 
 @inline
@@ -55,16 +71,16 @@ def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def
     d = writes.direction
     x, y, z = frame.to_frame(memory, M.up, d[0], d[1], d[2])
     memory[M.a], memory[M.a + 1], memory[M.a + 2] = x, y, z
-    F = sees.wish
-    wx, wy, wz = 0.0, 0.0, 0.0
-    if math.isfinite(F[0] + F[1] + F[2]):
-        wx, wy, wz = frame.to_frame(memory, M.up, F[0], F[1], F[2])
-    pull = 0.0
-    if now.step == 0 and z < -0.1:
-        pull = -wz / (n * z)
     for k in range(3):
         memory[M.wish + k] = memory[M.steady + k] = 0.0
-        memory[M.b + k] = pull * memory[M.a + k] + (wx if k == 0 else wy if k == 1 else wz) / n
+    _take(memory, M.steady, sees.steady_wish, 32767.0 * params[P.wish_unit])
+    pull = 0.0
+    if now.step == 0 and z < -0.1:
+        pull = -memory[M.steady + 2] / (n * z)
+    for k in range(3):
+        wish = memory[M.steady + k]
+        memory[M.wish + k] = memory[M.said + k] = wish
+        memory[M.b + k] = memory[M.said + 3 + k] = pull * memory[M.a + k] + wish / n
     for j in range(MOST):
         memory[M.peers + WIDTH * j + Q.count] = -1.0
 
@@ -73,7 +89,7 @@ def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def
 def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
     """Take what is new, sealed and fresh of those in the team."""
     key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
-    unit = params[P.unit]
+    wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
     for row in range(n):
         j = int(sees.members[row])
         if row == me or j < 0 or j >= MOST:
@@ -84,6 +100,8 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
             continue
         text = sees.inbox[row]
         count = message.count_near(message.get16(text, message.COUNT), now.step)
+        if abs(count - now.step) * now.dt > params[P.stale]:
+            continue
         if count <= memory[o + Q.count] or int(text[message.WHO]) & 15 != j:
             continue
         if not message.is_sealed(text, (count >> 16) & 0xFFFFFFFF, key_0, key_1):
@@ -98,15 +116,15 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
         for k in range(3):
             wish = message.get16(text, message.WISH + 2 * k)
             share = message.get16(text, message.SHARE + 2 * k)
-            memory[o + Q.wish + k] = unit * (wish - 65536 * (wish >> 15))
-            memory[o + Q.share + k] = unit * (share - 65536 * (share >> 15))
+            memory[o + Q.wish + k] = wish_unit * (wish - 65536 * (wish >> 15))
+            memory[o + Q.share + k] = share_unit * (share - 65536 * (share >> 15))
         if memory[o + Q.inside] == 0.0:
             continue
         for half in range(2):
-            peer, version, first, answered, yes, code = message.get_pair(
+            peer, version, first, answered, yes, known, code = message.get_pair(
                 text, message.PAIRS + message.PAIR * half
             )
-            if peer == int(sees.number[0]):
+            if peer == int(sees.number[0]) and known == memory[M.session]:
                 pairs.decide(memory, o, M.a, M.w, version, first, code, params[P.least])
                 pairs.hear_answer(memory, o, first, answered, yes)
 
@@ -196,7 +214,7 @@ def _move(memory, params, x, y, z, most):  # type: ignore[no-untyped-def]
         for k in range(3):
             memory[M.w + k] = memory[M.a + k]
         frame.turn_to(memory, M.w, x, y, z, angle)
-        if pairs.allowed(memory, M.peers, M.w, params[P.least], params[P.cone]):
+        if pairs.allowed(memory, M.peers, M.w, M.a, params[P.least], params[P.cone]):
             for k in range(3):
                 memory[M.a + k] = memory[M.w + k]
             return True
@@ -245,7 +263,8 @@ def _next_peer(memory, turn):  # type: ignore[no-untyped-def]
 @inline
 def _speak(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     text = writes.outbox
-    number, unit = int(sees.number[0]), params[P.unit]
+    number = int(sees.number[0])
+    wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
     text[message.WHO] = number | int(memory[M.session]) << 4
     message.put16(text, message.COUNT, now.step & 0xFFFF)
     team = 1 << number
@@ -253,15 +272,16 @@ def _speak(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
     message.put16(text, message.TEAM, team)
     for k in range(3):
-        wish, share = memory[M.steady + k] / unit, memory[M.b + k] / unit
-        wish, share = min(max(wish, -32767.0), 32767.0), min(max(share, -32767.0), 32767.0)
-        message.put16(text, message.WISH + 2 * k, math.floor(wish + 0.5) & 0xFFFF)
-        message.put16(text, message.SHARE + 2 * k, math.floor(share + 0.5) & 0xFFFF)
+        wish = message.rounded(memory[M.steady + k] / wish_unit)
+        share = message.rounded(memory[M.flown + k] / share_unit)
+        memory[M.said + k], memory[M.said + 3 + k] = wish_unit * wish, share_unit * share
+        message.put16(text, message.WISH + 2 * k, wish & 0xFFFF)
+        message.put16(text, message.SHARE + 2 * k, share & 0xFFFF)
     for half in range(2):
         at = message.PAIRS + message.PAIR * half
         j = _next_peer(memory, int(memory[M.turn]))
         if j < 0:
-            message.put_pair(text, at, number, 0, 0, 0, 0, 0)
+            message.put_pair(text, at, number, 0, 0, 0, 0, 0, 0)
             continue
         memory[M.turn] = j
         o = M.peers + WIDTH * j
@@ -269,7 +289,7 @@ def _speak(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         first = 1 if memory[o + Q.state] == FIRST else 0
         message.put_pair(
             text, at, j, int(memory[o + Q.version]), first, int(memory[o + Q.seen]),
-            int(memory[o + Q.yes]), int(memory[o + Q.code]),
+            int(memory[o + Q.yes]), int(memory[o + Q.session]), int(memory[o + Q.code]),
         )  # fmt: skip
     key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
     message.seal(text, (now.step >> 16) & 0xFFFFFFFF, key_0, key_1)
@@ -278,13 +298,13 @@ def _speak(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 @inline
 def _ask(sees, memory, writes, me, n, since):  # type: ignore[no-untyped-def]
     """Ask for the formation of all for the mean wish, from what is known of everybody's pull."""
-    m, b = M.mean, M.b
+    m = M.mean
     writes.asking[0] = since
     memory[M.asked] = 1.0
     x, y, z = frame.to_world(memory, M.up, memory[m], memory[m + 1], memory[m + 2])
     writes.asked_force[0], writes.asked_force[1], writes.asked_force[2] = x, y, z
     for row in range(n):
-        o = b if row == me else M.peers + WIDTH * int(sees.members[row]) + Q.share
+        o = M.said + 3 if row == me else M.peers + WIDTH * int(sees.members[row]) + Q.share
         x, y, z = (
             memory[o] - memory[m] / n,
             memory[o + 1] - memory[m + 1] / n,
@@ -324,14 +344,8 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     most = params[P.rate] * dt
     plan = sees.reference
     frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], most)
-    F = sees.wish
-    if math.isfinite(F[0] + F[1] + F[2]):
-        x, y, z = frame.to_frame(memory, M.up, F[0], F[1], F[2])
-        memory[M.wish], memory[M.wish + 1], memory[M.wish + 2] = x, y, z
-    F = sees.steady_wish
-    if math.isfinite(F[0] + F[1] + F[2]):
-        x, y, z = frame.to_frame(memory, M.up, F[0], F[1], F[2])
-        memory[M.steady], memory[M.steady + 1], memory[M.steady + 2] = x, y, z
+    _take(memory, M.wish, sees.wish, 32767.0 * params[P.wish_unit])
+    _take(memory, M.steady, sees.steady_wish, 32767.0 * params[P.wish_unit])
 
     _listen(now, sees, params, memory, me, n)
     late = params[P.patience] / dt
@@ -339,7 +353,7 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 
     holding = False
     for k in range(3):
-        memory[M.mean + k] = memory[M.steady + k]
+        memory[M.mean + k] = memory[M.said + k]
     for j in range(MOST):
         o = M.peers + WIDTH * j
         if memory[o + Q.inside] == 0.0:
@@ -373,14 +387,15 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     missing = 0.0
     for k in range(3):
         missing = max(missing, abs((x if k == 0 else y if k == 1 else z) - T * memory[a + k]))
+        memory[M.flown + k] = T * memory[a + k] + memory[M.wish + k] / team
     x, y, z = frame.to_world(memory, M.up, memory[a], memory[a + 1], memory[a + 2])
     writes.direction[0], writes.direction[1], writes.direction[2] = x, y, z
 
-    _speak(now, sees, params, memory, writes)
     writes.asking[0] = 0.0
     period = max(1, int(params[P.period] / dt + 0.5))
     if team == n and n > 1 and not holding and now.step % period == 0:
         _ask(sees, memory, writes, me, n, period * dt)
+    _speak(now, sees, params, memory, writes)
     return (HOLDING if holding else FREE) | (CLIPPED if missing > 1e-3 * size else FREE)
 
 
@@ -418,6 +433,8 @@ class Leaderless(AgentPart):
     """Time with which the own pull follows what the formation wants, s."""
     patience: Annotated[float, Field(gt=0.0, le=10.0)] = 0.15
     """Time after which somebody who is not heard is taken for silent, s."""
+    stale: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
+    """Age, by the own clock, from which on a message is not heard, s: more than clocks differ by."""
     period: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
     """Time between two questions to the allocator, s."""
     key: Annotated[str, Field(pattern="^[0-9a-f]{16}$")] = "0" * 16
@@ -437,11 +454,11 @@ class Leaderless(AgentPart):
         }
 
     def params(self, team: Team) -> Vector:
-        keep = math.radians(min(self.min_angle_deg + self.frame_deg, 150.0))
+        keep = math.radians(min(self.min_angle_deg + self.frame_deg + CODE, 150.0))
         weight = team.load_mass * max(team.gravity, 1e-3)
         return PARAMS.pack(
             team.n, g=team.gravity, least=math.sin(0.5 * keep), cone=math.cos(math.radians(self.max_cone_deg)), rate=self.max_rate,
-            settling=self.settling, patience=self.patience, period=self.period,
-            unit=4.0 * weight / 32767.0, key=(int(self.key[8:], 16), int(self.key[:8], 16)),
+            settling=self.settling, patience=self.patience, stale=self.stale, period=self.period,
+            wish_unit=WISHES * weight / 32767.0, share_unit=SHARES * weight / 32767.0, key=(int(self.key[8:], 16), int(self.key[:8], 16)),
             low=self.settled("tension_min", team), high=self.settled("tension_max", team),
         )  # fmt: skip
