@@ -77,6 +77,11 @@ class Judged:
         """Whether cables stayed apart, in every cycle."""
         return self.world_deg >= self.wanted_deg
 
+    @property
+    def good(self) -> bool:
+        """Whether nothing at all was wrong."""
+        return self.kept and self.sane and self.unfinished == 0
+
 
 def agent_for(n: int, made: type[Leaderless] = Leaderless) -> Leaderless:
     """Settings under which n drones are attacked."""
@@ -155,7 +160,7 @@ def _asked(
     mass = weight / 9.81
     plans = np.zeros((rows, n, 3))
     plans[..., 0] = 9.81 * np.tan(lean)
-    common = mass * (plans + [0.0, 0.0, 9.81])
+    common = mass * (plans + np.array([0.0, 0.0, 9.81]))
     wild = rng.choice([0.0, 0.1, 0.5, 1.5], size=(rows // 50 + 1, n, 1))
     targets = rng.standard_normal((rows // 50 + 1, n, 3)) * wild * weight
     steady = common + np.repeat(targets, 50, axis=0)[:rows]
