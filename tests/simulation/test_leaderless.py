@@ -6,13 +6,10 @@ import importlib
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from colift.control.agents import _message as message
 from colift.control.agents import leaderless
-from colift.kernel.signals import MESSAGE
-from colift.study import hostility, rehearsal
+from colift.study import hostility
 
 SOURCES = Path(leaderless.__file__).parent
 FILES = ("_frame", "_message", "_pairs", "leaderless")

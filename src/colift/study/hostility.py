@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colift.control.agents.leaderless import Leaderless
 from colift.control.allocation.safe import Safe
@@ -37,6 +38,8 @@ ROOM = 5.0
 """By how much more their allocators plan, degrees."""
 FRAMES = 1.0
 """By how much frames may differ, degrees."""
+PAUSE = 50
+"""Cycles between two restarts of a drone."""
 LEAN = 0.35
 """Largest lean of the planned force, rad."""
 
@@ -113,9 +116,10 @@ def attack(
     weight = team.load_mass * team.gravity
     inner = world = math.inf
     sane, unfinished, error = True, 0, 0.0
+    last = np.full(n, -PAUSE)
     for begin in range(0, cycles, SLICE):
         asked, calm = _asked(
-            rng, n, weight, begin, min(SLICE, cycles - begin), skews, seed % 2 == 0
+            rng, n, weight, begin, min(SLICE, cycles - begin), skews, seed % 2 == 0, last
         )
         out = flown.run(asked)
         inner = min(inner, float(least_angles(out[:, :, INNER:]).min()))
@@ -150,7 +154,8 @@ def _asked(
     rows: int,
     skews: Array,
     turning: bool,
-) -> tuple[Asked, Array]:
+    last: Array,
+) -> tuple[Asked, NDArray[np.bool_]]:
     """What happens in a stretch, and where it is calm."""
     steps = np.arange(begin, begin + rows)
     calm = (steps // 100) % 8 >= 4
@@ -170,7 +175,12 @@ def _asked(
         values[odd] = rng.choice([math.nan, math.inf, -math.inf, 1e300, -1e6, 0.0], (odd.sum(), 3))
     steady[calm], wishes[calm] = common[calm], common[calm]
     events = np.zeros((rows, n))
-    events[rng.random((rows, n)) < 0.001] = RESTARTS
+    begins = rng.random((rows, n)) < rng.choice([0.001, 0.01])
+    begins |= np.roll(begins, 1, axis=1) & (rng.random((rows, n)) < 0.3)  # two at once
+    for i in range(n):
+        for row in np.flatnonzero(begins[:, i] & ~calm):
+            if begin + row - last[i] >= PAUSE:
+                events[row, i], last[i] = RESTARTS, begin + row
     stalled = np.repeat(rng.random((rows // 20 + 1, n)) < 0.05, 20, axis=0)[:rows]
     if not turning:  # an agent that stands still does not turn with the plan
         events[stalled] = STALLS

@@ -22,6 +22,7 @@ from colift.kernel.signals import make_bus, named_tuple
 from colift.team import Team
 from colift.team.geometry import Array, pairwise_angles, ring
 from colift.team.scaling import scaled_load
+from colift.world.link.base import LinkPart
 from colift.world.network.base import NetworkPart
 
 DT = 0.01
@@ -29,6 +30,10 @@ DT = 0.01
 RUNS, RESTARTS, STALLS = 0.0, 1.0, 2.0
 """What happens to an agent in a cycle: it decides; it forgets everything before; it neither decides nor speaks."""
 Desk = named_tuple("Desk", agents.SIGNALS, __name__)
+Table = named_tuple(
+    "Table", ("force", "reference", "received_tensions", "received_directions"), __name__
+)
+_allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
 A, SESSION = MEMORY.at.a, MEMORY.at.session
 PULL, STATUS, INNER, WIDTH = 0, 4, 5, 8
 """Of a drone's row of the outcome: tension and direction, status, direction in its planned frame."""
@@ -59,7 +64,7 @@ def _rehearse(first, dt, network, agent, allocation, bus, wishes, steady, plans,
                 session = agent.memory[width * i + SESSION]
                 for m in range(width):
                     agent.memory[width * i + m] = 0.0
-                agent.memory[width * i + SESSION] = (session + 1.0) % 4
+                agent.memory[width * i + SESSION] = session % 15.0 + 1.0
             if events[row, i] != STALLS:
                 agents.decide_one(agent, allocation, bus, i, cycle, cycle * dt, dt)
             out[row, i, PULL] = bus.desired_tensions[i]
@@ -67,6 +72,27 @@ def _rehearse(first, dt, network, agent, allocation, bus, wishes, steady, plans,
             for k in range(3):
                 out[row, i, PULL + 1 + k] = bus.desired_directions[i, k]
                 out[row, i, INNER + k] = agent.memory[width * i + A + k]
+
+
+@kernel(
+    void(
+        i8, f8, PORTS["allocation"].type, PORTS["link"].type,
+        signals_type(Table, [type_of(name) for name in Table._fields]), matrix, matrix, tensor,
+    ),
+    counted=False,
+)  # fmt: skip
+def _command(first, dt, allocation, link, bus, forces, plans, out):  # type: ignore[no-untyped-def]
+    for row in range(forces.shape[0]):
+        cycle = first + row
+        for k in range(3):
+            bus.reference[2, k] = plans[row, k]
+            bus.force[k] = forces[row, k]
+        _allocate(allocation, cycle, cycle * dt, dt)
+        _transmit(link, cycle, cycle * dt, dt)
+        for i in range(bus.received_tensions.shape[0]):
+            out[row, i, PULL] = bus.received_tensions[i]
+            for k in range(3):
+                out[row, i, PULL + 1 + k] = bus.received_directions[i, k]
 
 
 class Asked(NamedTuple):
@@ -138,9 +164,38 @@ class Rehearsal:
     def run(self, asked: Asked) -> Array:
         """What each drone decides in each cycle, (rows, n, 8); see :data:`PULL`."""
         out = np.zeros((len(asked.wishes), self.team.n, WIDTH))
-        _rehearse(self.cycle, DT, *self._wires, self._desk, *asked, out)
+        network, agent, allocation = self._wires
+        _rehearse(self.cycle, DT, network, agent, allocation, self._desk, *asked, out)
         self.cycle += len(out)
         return out
+
+
+def commanded(
+    link: LinkPart,
+    team: Team,
+    directions: Array,
+    asked: Asked,
+    *,
+    allocation: AllocatorPart | None = None,
+    key: int = 1,
+) -> Array:
+    """What drones fly that one allocator tells over a radio: as :meth:`Rehearsal.run`, for the mean of their wishes."""
+    allocation = allocation or Safe()
+    bus = make_bus(team.n)
+    bus.desired_directions[:] = bus.received_directions[:] = directions
+    signals: dict[str, Any] = bus._asdict()
+    wires = [
+        PORTS[part.layer]
+        .wire(type(part).kernel, part.params(team), part.memory(team), signals, key=key)
+        .compiled()
+        for part in (allocation, link)
+    ]
+    out = np.zeros((len(asked.wishes), team.n, WIDTH))
+    plans = np.ascontiguousarray(asked.plans[:, 0])
+    table = Table(*(signals[name] for name in Table._fields))
+    allocate, transmit = wires
+    _command(0, DT, allocate, transmit, table, asked.wishes.mean(axis=1), plans, out)
+    return out
 
 
 def team_of(n: int) -> Team:

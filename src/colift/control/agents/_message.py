@@ -3,13 +3,13 @@
 ====== ===========================================================================================
 bytes  what
 ====== ===========================================================================================
-0      number of the drone (4 bits), session (2): another after a restart, spare (2)
+0      number of the drone (4 bits), session (4): 1 to 15, the next after a restart
 1-2    count of its cycles, the low 16 bits
 3-4    its view of the team: a bit for each number
 5-10   steady wish, three numbers of 16 bits, in the team's unit, in the planned frame
 11-16  pull beside its share of the wish, likewise
 17-21  a pair: peer (4 bits), version (3) and first (1) of its own reference, answered version (3), yes (1),
-       session of the peer (2), reference (26)
+       session of the peer (4; 0: never heard), reference (24)
 22-26  another pair
 27-29  seal over all of it and the high bits of the count
 ====== ===========================================================================================
@@ -29,7 +29,7 @@ MOST = 16
 """Drones in a team: as many as four bits can number."""
 WHO, COUNT, TEAM, WISH, SHARE, PAIRS, SEAL = 0, 1, 3, 5, 11, 17, 27
 PAIR = 5
-SIDE = 8190
+SIDE = 4094
 """Steps along a side of the octahedron's map: even, so that its middle has a code."""
 _WORD = 0xFFFFFFFF
 _HALF = 32768
@@ -62,20 +62,20 @@ def count_near(low, own):  # type: ignore[no-untyped-def]
 
 @inline
 def code_of(x, y, z):  # type: ignore[no-untyped-def]
-    """26 bits for a unit vector."""
+    """24 bits for a unit vector."""
     size = abs(x) + abs(y) + abs(z)
     u, v = x / size, y / size
     if z < 0.0:
         u, v = math.copysign(1.0 - abs(v), u), math.copysign(1.0 - abs(u), v)
     a, b = int((u + 1.0) * (0.5 * SIDE) + 0.5), int((v + 1.0) * (0.5 * SIDE) + 0.5)
-    return a | b << 13
+    return a | b << 12
 
 
 @inline
 def direction_of(code):  # type: ignore[no-untyped-def]
-    """The unit vector of 26 bits, whatever they are."""
-    u = min((code & 8191) * (2.0 / SIDE) - 1.0, 1.0)
-    v = min(((code >> 13) & 8191) * (2.0 / SIDE) - 1.0, 1.0)
+    """The unit vector of 24 bits, whatever they are."""
+    u = min((code & 4095) * (2.0 / SIDE) - 1.0, 1.0)
+    v = min(((code >> 12) & 4095) * (2.0 / SIDE) - 1.0, 1.0)
     z = 1.0 - abs(u) - abs(v)
     if z < 0.0:
         u, v = math.copysign(1.0 - abs(v), u), math.copysign(1.0 - abs(u), v)
@@ -86,7 +86,7 @@ def direction_of(code):  # type: ignore[no-untyped-def]
 @inline
 def put_pair(message, at, peer, version, first, answered, yes, session, code):  # type: ignore[no-untyped-def]
     """Write a pair into five bytes."""
-    bits = peer | version << 4 | first << 7 | answered << 8 | yes << 11 | session << 12 | code << 14
+    bits = peer | version << 4 | first << 7 | answered << 8 | yes << 11 | session << 12 | code << 16
     for k in range(PAIR):
         message[at + k] = (bits >> 8 * k) & 255
 
@@ -98,7 +98,7 @@ def get_pair(message, at):  # type: ignore[no-untyped-def]
     for k in range(PAIR):
         bits |= int(message[at + k]) << 8 * k
     return (
-        bits & 15, (bits >> 4) & 7, (bits >> 7) & 1, (bits >> 8) & 7, (bits >> 11) & 1, (bits >> 12) & 3, bits >> 14,
+        bits & 15, (bits >> 4) & 7, (bits >> 7) & 1, (bits >> 8) & 7, (bits >> 11) & 1, (bits >> 12) & 15, bits >> 16,
     )  # fmt: skip
 
 

@@ -91,16 +91,18 @@ def stand(memory, o, a):  # type: ignore[no-untyped-def]
 
 
 @inline
-def decide(memory, o, a, scratch, version, first, code, least):  # type: ignore[no-untyped-def]
+def decide(memory, o, a, scratch, version, first, yes, code, least):  # type: ignore[no-untyped-def]
     """Take or refuse what the peer at ``o`` offers."""
     known = memory[o + Q.known] != 0.0
+    standing = memory[o + Q.state] == FIRST
+    anew = first != 0 and (version != memory[o + Q.seen] or (yes == 0 and not standing))
+    if known and anew:  # it has begun anew, and has forgotten what it had adopted
+        stand(memory, o, a)
+        known, standing = False, True
     if known and version == memory[o + Q.seen]:
         if first != 0:  # our answer was lost
             memory[o + Q.due] = 1.0
         return
-    if known and first != 0:  # it has begun anew
-        stand(memory, o, a)
-        known = False
     if not known and first == 0:
         return
     if known and version != (memory[o + Q.seen] + 1.0) % 8:
@@ -114,12 +116,14 @@ def decide(memory, o, a, scratch, version, first, code, least):  # type: ignore[
     else:
         good = _apart(memory, o + Q.r0, scratch)
     memory[o + Q.due] = 1.0
+    if (
+        not good and standing
+    ):  # who stands refuses nothing: that would look as if nothing had been adopted
+        return
     if good:
         for k in range(3):
             memory[o + Q.rb + k] = memory[scratch + k]
         memory[o + Q.known] = 1.0
-    elif not known:  # it stands there: nothing else will do
-        return
     memory[o + Q.seen] = version
     memory[o + Q.yes] = 1.0 if good else 0.0
 

@@ -36,7 +36,8 @@ MEMORY = Layout(
 )  # fmt: skip
 """``up``: axis of the planned frame, ``a``: direction in it, ``b``: pull beside the share of the wish, ``target``: where the plan of the formation
 wants it, ``mean``: mean of the steady wishes; ``flown``: ``b`` of what is flown in truth; ``said``: own
-wish and pull as the others hear them, so that all see the same; ``turn``: peer that was written to last; ``w``: scratch."""
+wish and pull as the others hear them, so that all see the same; ``turn``: peer that was written to last; ``session``: 1 to 15, the next after
+a restart, which is told from outside; ``w``: scratch."""
 P, M = PARAMS.at, MEMORY.at
 AHEAD = 0.3
 """Largest distance of an offered reference from the own direction, rad."""
@@ -65,6 +66,7 @@ def _take(memory, at, F, most):  # type: ignore[no-untyped-def]
 def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def]
     """Stand where the cable is: with an equal share at the start, with none when joining."""
     memory[M.started] = 1.0
+    memory[M.session] = max(memory[M.session], 1.0)
     memory[M.up], memory[M.up + 1], memory[M.up + 2] = 0.0, 0.0, 1.0
     plan = sees.reference
     frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], math.pi)
@@ -108,7 +110,7 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
             continue
         memory[o + Q.count] = count
         memory[o + Q.silent] = 0.0
-        session = (int(text[message.WHO]) >> 4) & 3
+        session = (int(text[message.WHO]) >> 4) & 15
         if session != memory[o + Q.session]:
             memory[o + Q.session] = session
             if memory[o + Q.inside] != 0.0:
@@ -125,7 +127,7 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
                 text, message.PAIRS + message.PAIR * half
             )
             if peer == int(sees.number[0]) and known == memory[M.session]:
-                pairs.decide(memory, o, M.a, M.w, version, first, code, params[P.least])
+                pairs.decide(memory, o, M.a, M.w, version, first, yes, code, params[P.least])
                 pairs.hear_answer(memory, o, first, answered, yes)
 
 
