@@ -126,7 +126,7 @@ def curve(
     lines = [["", *(f"n = {n}" for n in sizes)]]
     for name, (size, rocking, radio) in cases.items():
         found = {n: [rehearsed(n, seed, size, rocking, radio) for seed in seeds] for n in sizes}
-        for kind in ("agents", "central"):
+        for kind in ("agents",) if {*radio} & {"burst", "split"} else ("agents", "central"):
             cells = []
             for n in sizes:
                 each = [run[kind] for run in found[n]]

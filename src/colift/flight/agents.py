@@ -18,7 +18,7 @@ Asked, Answers = PORTS["allocation"].Sees, PORTS["allocation"].Writes
 _agree, carry, _plan = (PORTS[name].invoke for name in ("agents", "network", "allocation"))
 
 SIGNALS = (
-    "force", "steady_force", "reference", "wishes", "steady_wishes", "plans", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
+    "force", "steady_force", "reference", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
     "desired_directions", "outboxes", "asking", "asked_forces", "team_tensions", "team_directions",
     "agent_status", "received_tensions", "received_directions",
 )  # fmt: skip
@@ -30,7 +30,7 @@ def rows_of(bus, i):  # type: ignore[no-untyped-def]
     """What drone i sees and what it writes."""
     sees = Sees(
         bus.wishes[i], bus.steady_wishes[i], bus.plans[i], bus.members[i : i + 1], bus.members, bus.inboxes[i],
-        bus.heard[i], bus.carrying,
+        bus.heard[i], bus.carrying, bus.felt_forces[i],
     )  # fmt: skip
     writes = Writes(
         bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i],

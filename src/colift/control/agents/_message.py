@@ -5,7 +5,7 @@ bytes  what
 ====== ===========================================================================================
 0      number of the drone (4 bits), session (4): 1 to 15, the next after a restart
 1-2    count of its cycles, the low 16 bits
-3-4    its view of the team: a bit for each number
+3-4    its view of the team: a bit for each number; its own is 0 while it holds, as it misses somebody
 5-10   steady wish, three numbers of 16 bits, in the team's unit, in the planned frame
 11-16  pull beside its share of the wish, likewise
 17-21  a pair: peer (4 bits), version (3) and first (1) of its own reference, answered version (3), yes (1),

@@ -23,7 +23,7 @@ from colift.kernel.layout import Layout
 
 PEER = Layout(
     team={
-        "inside": 1, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
+        "inside": 1, "gone": 1, "holds": 1, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
         "state": 1, "version": 1, "code": 1, "r0": 3, "r1": 3, "reach": 1,
         "known": 1, "rb": 3, "seen": 1, "yes": 1, "due": 1,
     }

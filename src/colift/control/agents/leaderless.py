@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from colift.control.agents import _evidence as evidence
 from colift.control.agents import _frame as frame
 from colift.control.agents import _message as message
 from colift.control.agents import _pairs as pairs
@@ -31,11 +32,11 @@ PARAMS = Layout(
 MEMORY = Layout(
     drone={
         "started": 1, "asked": 1, "planned": 1, "turn": 1, "session": 1, "up": 3, "a": 3, "w": 3, "b": 3,
-        "target": 3, "mean": 3, "wish": 3, "steady": 3, "said": 6, "flown": 3, "peers": WIDTH * MOST,
+        "target": 3, "mean": 3, "wish": 3, "steady": 3, "said": 6, "lack": 6, "flown": 3, "pull": 3, "peers": WIDTH * MOST,
     }
 )  # fmt: skip
 """``up``: axis of the planned frame, ``a``: direction in it, ``b``: pull beside the share of the wish, ``target``: where the plan of the formation
-wants it, ``mean``: mean of the steady wishes; ``flown``: ``b`` of what is flown in truth; ``said``: own
+wants it, ``mean``: mean of the steady wishes; ``lack``: force on the load that nobody explains, and what of it is usual; ``pull``: as flown, ``flown``: ``b`` of it; ``said``: own
 wish and pull as the others hear them, so that all see the same; ``turn``: peer that was written to last; ``session``: 1 to 15, the next after
 a restart, which is told from outside; ``w``: scratch."""
 P, M = PARAMS.at, MEMORY.at
@@ -44,6 +45,8 @@ AHEAD = 0.3
 ROUNDS = 3
 """How often the wanted direction is pushed back inside of all planes."""
 HALVINGS = 5
+BALANCE = 0.5
+"""Time in which pulls beside the shares come to balance when nobody is asked for the formation, s."""
 CODE = 0.1
 """By how much two directions may be nearer, degrees, than the nearest codes for them."""
 WISHES, SHARES = 4.0, 1.0
@@ -64,7 +67,7 @@ def _take(memory, at, F, most):  # type: ignore[no-untyped-def]
 
 @inline
 def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def]
-    """Stand where the cable is: with an equal share at the start, with none when joining."""
+    """Stand where the cable is: with an equal share at the start, else with the pull that the drone has."""
     memory[M.started] = 1.0
     memory[M.session] = max(memory[M.session], 1.0)
     memory[M.up], memory[M.up + 1], memory[M.up + 2] = 0.0, 0.0, 1.0
@@ -76,7 +79,7 @@ def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def
     for k in range(3):
         memory[M.wish + k] = memory[M.steady + k] = 0.0
     _take(memory, M.steady, sees.steady_wish, 32767.0 * params[P.wish_unit])
-    pull = 0.0
+    pull = max(writes.tension[0], 0.0)
     if now.step == 0 and z < -0.1:
         pull = -memory[M.steady + 2] / (n * z)
     for k in range(3):
@@ -110,6 +113,8 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
             continue
         memory[o + Q.count] = count
         memory[o + Q.silent] = 0.0
+        team = message.get16(text, message.TEAM)
+        memory[o + Q.holds] = 1.0 if (team >> j) & 1 == 0 else 0.0
         session = (int(text[message.WHO]) >> 4) & 15
         if session != memory[o + Q.session]:
             memory[o + Q.session] = session
@@ -144,6 +149,12 @@ def _view(sees, memory, me, n, late, started):  # type: ignore[no-untyped-def]
             if row != me and int(sees.members[row]) == j:
                 here = memory[o + Q.inside] != 0.0 and memory[o + Q.silent] <= late
                 there = sees.evidence[row] != 0.0 or here
+        if memory[o + Q.inside] != 0.0 and memory[o + Q.silent] > late:
+            if evidence.missing(memory, o, M.lack, count):
+                memory[o + Q.gone] = 1.0
+        elif memory[o + Q.silent] == 0.0:
+            memory[o + Q.gone] = 0.0
+        there = there and memory[o + Q.gone] == 0.0
         if there and memory[o + Q.inside] == 0.0:
             memory[o + Q.inside] = 1.0
             pairs.stand(memory, o, M.a)
@@ -263,13 +274,13 @@ def _next_peer(memory, turn):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _speak(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+def _speak(now, sees, params, memory, writes, holding):  # type: ignore[no-untyped-def]
     text = writes.outbox
     number = int(sees.number[0])
     wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
     text[message.WHO] = number | int(memory[M.session]) << 4
     message.put16(text, message.COUNT, now.step & 0xFFFF)
-    team = 1 << number
+    team = 0 if holding else 1 << number
     for j in range(MOST):
         team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
     message.put16(text, message.TEAM, team)
@@ -351,9 +362,14 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 
     _listen(now, sees, params, memory, me, n)
     late = params[P.patience] / dt
+    team = 1
+    for j in range(MOST):
+        team += int(memory[M.peers + WIDTH * j + Q.inside])
+    x, y, z = frame.to_frame(memory, M.up, sees.felt[0], sees.felt[1], sees.felt[2])
+    evidence.weigh(memory, M.peers, M.lack, (x, y, z), M.pull, team, late, dt)
     team = _view(sees, memory, me, n, late, started)
 
-    holding = False
+    holding = others = False
     for k in range(3):
         memory[M.mean + k] = memory[M.said + k]
     for j in range(MOST):
@@ -362,14 +378,25 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             continue
         if memory[o + Q.silent] > late or memory[o + Q.known] == 0.0:
             holding = True
+        others = others or memory[o + Q.holds] != 0.0  # then all hold, so that the sum does
         for k in range(3):
             memory[M.mean + k] += memory[o + Q.wish + k]
     for k in range(3):
         memory[M.mean + k] /= team
-    if memory[M.planned] != 0.0 and not holding:
+    if memory[M.planned] != 0.0 and not (holding or others):
         follow = dt / (dt + params[P.settling])
         for k in range(3):
             memory[M.b + k] += follow * (memory[M.target + k] - memory[M.b + k])
+
+    # Whatever happens, each takes its part of what the pulls heard of do not balance.
+    share = dt / (dt + BALANCE) / team
+    for k in range(3):
+        left = memory[M.said + 3 + k]
+        for j in range(MOST):
+            o = M.peers + WIDTH * j
+            if memory[o + Q.inside] != 0.0 and memory[o + Q.count] >= 0.0:
+                left += memory[o + Q.share + k]
+        memory[M.b + k] -= share * left
 
     # f = b - F / |V|
     x, y, z = (
@@ -389,16 +416,17 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     missing = 0.0
     for k in range(3):
         missing = max(missing, abs((x if k == 0 else y if k == 1 else z) - T * memory[a + k]))
-        memory[M.flown + k] = T * memory[a + k] + memory[M.wish + k] / team
+        memory[M.pull + k] = T * memory[a + k]
+        memory[M.flown + k] = memory[M.pull + k] + memory[M.wish + k] / team
     x, y, z = frame.to_world(memory, M.up, memory[a], memory[a + 1], memory[a + 2])
     writes.direction[0], writes.direction[1], writes.direction[2] = x, y, z
 
     writes.asking[0] = 0.0
     period = max(1, int(params[P.period] / dt + 0.5))
-    if team == n and n > 1 and not holding and now.step % period == 0:
+    if team == n and n > 1 and not (holding or others) and now.step % period == 0:
         _ask(sees, memory, writes, me, n, period * dt)
-    _speak(now, sees, params, memory, writes)
-    return (HOLDING if holding else FREE) | (CLIPPED if missing > 1e-3 * size else FREE)
+    _speak(now, sees, params, memory, writes, holding)
+    return (HOLDING if holding or others else FREE) | (CLIPPED if missing > 1e-3 * size else FREE)
 
 
 Force = Annotated[float, Field(gt=0.0, le=1e6)]
