@@ -12,7 +12,7 @@ from colift.control.agents import leaderless
 from colift.study import hostility
 
 SOURCES = Path(leaderless.__file__).parent
-FILES = ("_frame", "_message", "_pairs", "leaderless")
+FILES = ("_evidence", "_frame", "_message", "_pairs", "leaderless")
 MUTANTS = {
     "adopts at once": ("_pairs", "good = keeps(memory, a, o + Q.r0, scratch, least)", "good = True"),
     "takes messages twice": ("leaderless", "if count <= memory[o + Q.count] or int", "if int"),

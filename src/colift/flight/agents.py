@@ -19,7 +19,7 @@ _agree, carry, _plan = (PORTS[name].invoke for name in ("agents", "network", "al
 
 SIGNALS = (
     "force", "steady_force", "reference", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
-    "desired_directions", "outboxes", "asking", "asked_forces", "team_tensions", "team_directions",
+    "desired_directions", "outboxes", "agreed_forces", "asking", "asked_forces", "team_tensions", "team_directions",
     "agent_status", "received_tensions", "received_directions",
 )  # fmt: skip
 """What a cycle takes and gives of the bus, beside what the network does."""
@@ -34,7 +34,7 @@ def rows_of(bus, i):  # type: ignore[no-untyped-def]
     )  # fmt: skip
     writes = Writes(
         bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i],
-        bus.asking[i : i + 1], bus.asked_forces[i], bus.team_tensions[i], bus.team_directions[i],
+        bus.asking[i : i + 1], bus.agreed_forces[i], bus.asked_forces[i], bus.team_tensions[i], bus.team_directions[i],
     )  # fmt: skip
     return sees, writes
 

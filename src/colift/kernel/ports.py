@@ -243,7 +243,7 @@ PORTS: dict[str, Port] = {
         Port("reference", sees=()),
         Port(
             "load_control",
-            sees=("estimated_load", *_turned("estimated_"), *_WANTED, "estimated_forces", "standing"),
+            sees=("estimated_load", *_turned("estimated_"), *_WANTED, "estimated_forces", "standing", "agreed_force"),
         ),
         Port(
             "allocation",

@@ -32,11 +32,11 @@ PARAMS = Layout(
 MEMORY = Layout(
     drone={
         "started": 1, "asked": 1, "planned": 1, "turn": 1, "session": 1, "up": 3, "a": 3, "w": 3, "b": 3,
-        "target": 3, "mean": 3, "wish": 3, "steady": 3, "said": 6, "lack": 6, "flown": 3, "pull": 3, "peers": WIDTH * MOST,
+        "target": 3, "mean": 3, "agreed": 3, "wish": 3, "steady": 3, "said": 6, "lack": 6, "flown": 3, "pull": 3, "peers": WIDTH * MOST,
     }
 )  # fmt: skip
 """``up``: axis of the planned frame, ``a``: direction in it, ``b``: pull beside the share of the wish, ``target``: where the plan of the formation
-wants it, ``mean``: mean of the steady wishes; ``lack``: force on the load that nobody explains, and what of it is usual; ``pull``: as flown, ``flown``: ``b`` of it; ``said``: own
+wants it, ``mean``: mean of the steady wishes, ``agreed``: while nobody held; ``lack``: force on the load that nobody explains, and what of it is usual; ``pull``: as flown, ``flown``: ``b`` of it; ``said``: own
 wish and pull as the others hear them, so that all see the same; ``turn``: peer that was written to last; ``session``: 1 to 15, the next after
 a restart, which is told from outside; ``w``: scratch."""
 P, M = PARAMS.at, MEMORY.at
@@ -84,7 +84,7 @@ def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def
         pull = -memory[M.steady + 2] / (n * z)
     for k in range(3):
         wish = memory[M.steady + k]
-        memory[M.wish + k] = memory[M.said + k] = wish
+        memory[M.wish + k] = memory[M.said + k] = memory[M.agreed + k] = wish
         memory[M.b + k] = memory[M.said + 3 + k] = pull * memory[M.a + k] + wish / n
     for j in range(MOST):
         memory[M.peers + WIDTH * j + Q.count] = -1.0
@@ -421,6 +421,12 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     x, y, z = frame.to_world(memory, M.up, memory[a], memory[a + 1], memory[a + 2])
     writes.direction[0], writes.direction[1], writes.direction[2] = x, y, z
 
+    m = M.agreed
+    if not (holding or others):
+        for k in range(3):
+            memory[m + k] = memory[M.mean + k]
+    x, y, z = frame.to_world(memory, M.up, memory[m], memory[m + 1], memory[m + 2])
+    writes.agreed[0], writes.agreed[1], writes.agreed[2] = x, y, z
     writes.asking[0] = 0.0
     period = max(1, int(params[P.period] / dt + 0.5))
     if team == n and n > 1 and not (holding or others) and now.step % period == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -22,13 +23,15 @@ PARAMS = Layout(
 )  # fmt: skip
 MEMORY = Layout(team={"integral": 3})
 P, M = PARAMS.at, MEMORY.at
+DRAWN = 0.05
+"""Time in which the integral is drawn to what a team without a leader has agreed on, s."""
 
 
 @kernel(SIGNATURE, counted=False)
 def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     load, reference = sees.estimated_load, sees.reference
-    u_L = writes.force
+    u_L, agreed = writes.force, sees.agreed_force
     # u_L = m_L (g e3 + xdd_d) - k_p e - k_d edot - k_i int e
     m_L, g, sign, limit = params[P.m_L], params[P.g], params[P.sign], params[P.limit]
     for k in range(3):
@@ -37,6 +40,10 @@ def _pid(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         S = M.integral + k
         memory[S] = min(max(memory[S] + dt * e, -limit), limit)
         gravity = g if k == 2 else 0.0
+        if math.isfinite(agreed[k]) and params[P.k_i + k] > 0.0:  # what all have learned
+            known = sign * m_L * (gravity + params[P.feed_forward] * reference[2, k])
+            wanted = (known - agreed[k]) / params[P.k_i + k]
+            memory[S] += min(dt / DRAWN, 1.0) * (min(max(wanted, -limit), limit) - memory[S])
         u_L[k] = (
             sign * m_L * (gravity + params[P.feed_forward] * reference[2, k])
             - params[P.k_p + k] * e
