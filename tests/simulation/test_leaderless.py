@@ -6,9 +6,12 @@ import importlib
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from colift.control.agents import _message as message
 from colift.control.agents import leaderless
+from colift.kernel.signals import MESSAGE
 from colift.study import hostility
 
 SOURCES = Path(leaderless.__file__).parent
@@ -66,3 +69,63 @@ def test_one_wrong_line_is_caught(name, tmp_path):
     made = mutant(name, tmp_path)
     judged = [hostility.attack(4, seed, 8_000, made) for seed in range(8)]
     assert not all(each.good for each in judged)
+
+
+VECTORS = (
+    0x5B9F35A9, 0xB85A4727, 0x03A662FA, 0x04E7FE8A, 0x89466E2A, 0x69B6FAC5, 0x23FC6358, 0xC563CF8B,
+)  # fmt: skip
+"""Of HalfSipHash-2-4 with its authors' key, for 0 to 7 bytes."""
+KEY = (0x03020100, 0x07060504)
+
+
+@pytest.mark.parametrize("size", range(8))
+def test_the_seal_is_that_of_its_authors(size):
+    text = np.arange(MESSAGE, dtype=np.uint8)
+    assert message.half_sip(text, size, 0, 0, *KEY) == VECTORS[size]
+    if size >= 4:
+        tail = int.from_bytes(bytes(range(size - 4, size)), "little")
+        assert message.half_sip(text, size - 4, tail, 4, *KEY) == VECTORS[size]
+
+
+def test_a_changed_bit_breaks_the_seal():
+    rng = np.random.default_rng(1)
+    text = rng.integers(0, 256, MESSAGE).astype(np.uint8)
+    message.seal(text, 5, *KEY)
+    assert message.is_sealed(text, 5, *KEY)
+    assert not message.is_sealed(text, 6, *KEY)
+    assert not message.is_sealed(text, 5, KEY[0], KEY[1] ^ 1)
+    for bit in range(8 * MESSAGE):
+        text[bit // 8] ^= 1 << bit % 8
+        assert not message.is_sealed(text, 5, *KEY)
+        text[bit // 8] ^= 1 << bit % 8
+
+
+def test_every_code_is_a_direction_and_every_direction_has_a_near_one():
+    rng = np.random.default_rng(2)
+    for code in (0, 0xFFFFFF, 0xFFF, 0xFFF000, *rng.integers(0, 1 << 24, 2000).tolist()):
+        assert np.linalg.norm(message.direction_of(code)) == pytest.approx(1.0, abs=1e-12)
+    axes = [s * np.eye(3)[k] for k in range(3) for s in (1.0, -1.0)]
+    for a in [*axes, *rng.standard_normal((2000, 3))]:
+        a = a / np.linalg.norm(a)
+        code = message.code_of(*a)
+        assert 0 <= code < 1 << 24
+        assert np.degrees(np.linalg.norm(a - message.direction_of(code))) < 0.5 * leaderless.CODE
+
+
+def test_pairs_survive_a_message():
+    text = np.zeros(MESSAGE, np.uint8)
+    for fields in (
+        (15, 7, 1, 7, 1, 15, 0xFFFFFF),
+        (0, 0, 0, 0, 0, 0, 0),
+        (3, 5, 0, 2, 1, 9, 0x123456),
+    ):
+        message.put_pair(text, message.PAIRS + message.PAIR, *fields)
+        assert message.get_pair(text, message.PAIRS + message.PAIR) == fields
+        assert (text[: message.PAIRS + message.PAIR] == 0).all()
+        assert (text[message.SEAL :] == 0).all()
+
+
+@pytest.mark.parametrize("own", [0, 5, 32767, 32768, 65535, 65536, 1_000_000])
+def test_a_count_is_that_nearest_to_the_own(own):
+    for count in range(max(own - 300, 0), own + 300, 7):
+        assert message.count_near(count & 0xFFFF, own) == count

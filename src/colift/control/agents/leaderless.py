@@ -47,7 +47,7 @@ ROUNDS = 3
 HALVINGS = 5
 BALANCE = 0.5
 """Time in which pulls beside the shares come to balance when nobody is asked for the formation, s."""
-CODE = 0.1
+CODE = 0.12
 """By how much two directions may be nearer, degrees, than the nearest codes for them."""
 WISHES, SHARES = 4.0, 1.0
 """Largest wish and pull beside its share that a message can say, in weights of the load."""

@@ -23,9 +23,12 @@ import numpy as np
 from colift.errors import ColiftError
 from colift.flight.swarm.protocol import END, HOST, Command, Tick, command_of, pack_tick
 from colift.interrupts import heard as interrupts
+from colift.mission import load_mission
 from colift.mission.mission import Mission
 from colift.team.geometry import Array, min_norm_tensions
 
+WHOLE = 0.05
+"""Share of the weight that may be missing of a force that is whole."""
 WATCHDOG = 0.05
 """Time without an answer after which a drone pulls no more, s."""
 LAG = 0.02
@@ -39,6 +42,11 @@ START_TIME = 120.0
 """Longest time until all agents are there, s: they may have to compile."""
 ANSWER_TIME = 1.0
 """Longest wait for an agent that lives, s, where the world waits."""
+
+CYCLE = 0.01
+"""Shortest cycle, s."""
+GAINS = {"k_p": 35.0, "k_d": 9.0, "k_i": 13.0}
+"""Of the load's own controller where the mission has none, over its mass: those of the paper."""
 
 Watch = Callable[[int, "Swarm"], None]
 
@@ -85,11 +93,48 @@ class Flown:
         wish = np.nanmean(np.array(self.wishes), axis=1)
         return np.asarray(np.linalg.norm(np.array(self.pulls).sum(axis=1) - wish, axis=1))
 
+    def missing_now(self) -> float:
+        """The last of it."""
+        wish = np.nanmean(self.wishes[-1], axis=0)
+        return float(np.linalg.norm(self.pulls[-1].sum(axis=0) - wish))
+
+    def summary(self, strokes: Sequence[Stroke], weight: float) -> dict[str, Any]:
+        """Distance from the path, m, and for each agent that was killed the time until the force was whole again, s."""
+        away = np.linalg.norm(np.array(self.load) - np.array(self.wanted), axis=1)
+        killed = [
+            {
+                "drone": stroke.drone,
+                "at": stroke.at,
+                "settled": self.settled(stroke.at, WHOLE, weight),
+            }
+            for stroke in strokes
+            if not stroke.restart
+        ]
+        return {
+            "tracking_max_m": float(away.max()),
+            "tracking_rms_m": float(np.sqrt(np.mean(away**2))),
+            "killed": killed,
+        }
+
     def settled(self, at: float, share: float, weight: float) -> float:
         """Time from ``at`` (s) until so much of the weight is missing no more, for the next two seconds, s."""
         first = round(at / self.dt)
         late = np.flatnonzero(self.missing[first : first + round(2.0 / self.dt)] > share * weight)
         return float((late[-1] + 1) * self.dt) if late.size else 0.0
+
+
+def for_agents(name: str, overrides: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """What else a mission needs to be flown by a swarm, and a note on each: agents, a law of the load's place, a cycle of 10 ms."""
+    mission = load_mission(name, overrides)
+    found: dict[str, Any] = {}
+    if mission.kinds["agents"] != "leaderless":
+        found["agents.kind"] = "leaderless"
+    if mission.timing.allocation < CYCLE:
+        found["timing.allocation"] = CYCLE
+    if mission.kinds["load_control"] != "pid":
+        mass = mission.team.load_mass
+        found |= {"load_control": {"kind": "pid", **{k: [g * mass] * 3 for k, g in GAINS.items()}}}
+    return {**overrides, **found}, [f"{field} = {value}" for field, value in found.items()]
 
 
 class Swarm:

@@ -1,0 +1,136 @@
+"""`colift swarm`: a team without a leader as processes of their own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from colift.cli.base import (
+    Json,
+    JsonFile,
+    MissionName,
+    Sets,
+    app,
+    console,
+    emit,
+    loading,
+    save_json,
+    show_notes,
+)
+
+if TYPE_CHECKING:
+    from colift.flight.swarm.world import Stroke, Swarm
+
+EVERY = 20
+"""Cycles between two pictures."""
+
+
+@app.command()
+def swarm(
+    mission: MissionName = "paper-spiral",
+    seconds: Annotated[
+        float, typer.Option(help="Length of the flight, s.", min=1, max=3600)
+    ] = 10.0,
+    loss: Annotated[
+        float, typer.Option(help="Share of the messages that nobody hears.", min=0, max=0.99)
+    ] = 0.2,
+    kill: Annotated[
+        list[str] | None, typer.Option(metavar="DRONE@TIME", help="End this agent with SIGKILL, s.")
+    ] = None,
+    restart: Annotated[
+        list[str] | None, typer.Option(metavar="DRONE@TIME", help="Start this agent again, s.")
+    ] = None,
+    sets: Sets = None,
+    waits: Annotated[
+        bool,
+        typer.Option(
+            "--wait",
+            help="Let each cycle take as long as its answers do, so that a busy machine changes nothing.",
+        ),
+    ] = False,
+    file: JsonFile = None,
+    as_json: Json = False,
+) -> None:
+    """Start a world and one process for each drone, which talk over UDP on this machine; kill some.
+
+    No process is special: each drone's has its own measurements of the load, its own load controller, agent and allocator.
+    The load is a point that their pulls carry.
+
+    [bold]Examples[/bold]
+
+      colift swarm
+      colift swarm --kill 2@4 --restart 2@6 --loss 0.5
+      colift swarm eight-drones --kill 0@5 --kill 3@8 --seconds 15
+    """
+    from colift.mission.load import parse_overrides
+
+    with loading():
+        from colift.flight.swarm import world
+        from colift.mission import load_mission
+
+        strokes = [*_strokes(kill, "--kill"), *_strokes(restart, "--restart", again=True)]
+        overrides, notes = world.for_agents(mission, parse_overrides(sets))
+        loaded = load_mission(mission, overrides)
+        for stroke in strokes:
+            if stroke.drone >= loaded.team.n:
+                raise typer.BadParameter(
+                    f"there is no drone {stroke.drone}; the team has {loaded.team.n}"
+                )
+        team = world.Swarm(loaded, mission, overrides, loss=loss)
+    show_notes(notes)
+    shown = not as_json and console(stderr=True).is_terminal
+    flown = team.run(seconds, strokes, waits=waits, watch=_show if shown else None)
+    weight = loaded.team.load_mass * loaded.team.gravity
+    result = flown.summary(strokes, weight)
+    save_json(file, result)
+    if as_json:
+        emit(result)
+        return
+    out = console()
+    out.print(f"Load within {100 * result['tracking_max_m']:.1f} cm of its reference.")
+    for each in result["killed"]:
+        out.print(
+            f"Drone {each['drone']} killed at {each['at']:g} s: for good within 5 % of the weight after {1e3 * each['settled']:.0f} ms.",
+            highlight=False,
+        )
+
+
+def _strokes(given: list[str] | None, option: str, *, again: bool = False) -> list[Stroke]:
+    from colift.flight.swarm.world import Stroke
+
+    found = []
+    for text in given or ():
+        drone, _, at = text.partition("@")
+        try:
+            found.append(Stroke(at=float(at), drone=int(drone), restart=again))
+        except ValueError:
+            raise typer.BadParameter(f"{option} {text}: must be DRONE@TIME, such as 2@4") from None
+        if not (found[-1].drone >= 0 and 0.0 < found[-1].at < 1e6):
+            raise typer.BadParameter(f"{option} {text}: drones count from 0, times are above 0 s")
+    return found
+
+
+def _show(cycle: int, team: Swarm) -> None:
+    """Who hears whom, on one line that is written anew."""
+    if cycle % EVERY:
+        return
+    flown: Any = team.flown
+    rows = flown.hears[-EVERY:]
+    lines = []
+    for i in range(team.n):
+        if flown.status[-1][i] < 0:
+            lines.append(f"{i}: dead")
+            continue
+        shares = [sum(row[i] >> j & 1 for row in rows) / len(rows) for j in range(team.n)]
+        lines.append(
+            f"{i}: "
+            + "".join(
+                "·" if j == i else "▁▂▃▄▅▆▇█"[min(int(8 * s), 7)] for j, s in enumerate(shares)
+            )
+        )
+    missing = 1e3 * float(flown.missing_now())
+    console(stderr=True).print(
+        f"{cycle * team.dt:6.1f} s  {missing:6.0f} mN missing   " + "   ".join(lines),
+        highlight=False, markup=False,
+    )  # fmt: skip

@@ -1,0 +1,134 @@
+"""Agents as processes of their own: any of them is killed, and the others bear its share."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from colift.control.agents._pairs import WIDTH, Q
+from colift.control.agents.leaderless import MEMORY
+from colift.errors import ColiftError
+from colift.flight.swarm import protocol, world
+from colift.flight.swarm.agent import Drone
+from colift.flight.swarm.protocol import Command, Tick
+from colift.mission import load_mission
+
+NAME = "paper-spiral"
+SETTINGS = {"agents.kind": "leaderless", "allocation.kind": "safe", "timing.allocation": 0.01}
+PATIENCE, ALLOWED = 0.15, 0.15
+
+
+def swarm(loss: float = 0.2) -> world.Swarm:
+    return world.Swarm(load_mission(NAME, SETTINGS), NAME, SETTINGS, loss=loss)
+
+
+@pytest.mark.parametrize("drone", range(4))
+def test_whichever_process_is_killed_the_force_is_whole_again_soon(drone):
+    team = swarm()
+    flown = team.run(6.0, [world.Stroke(4.0, drone)], waits=True)
+    weight = team.mission.team.load_mass * team.mission.team.gravity
+    first = round(4.0 / flown.dt)
+    assert flown.missing[first : first + 30].max() > 0.2 * weight
+    assert flown.settled(4.0, world.WHOLE, weight) <= PATIENCE + ALLOWED
+    away = np.linalg.norm(np.array(flown.load) - np.array(flown.wanted), axis=1)
+    assert away.max() < 0.1
+    assert all(row[drone] == -1 for row in flown.status[first + 1 :])
+    others = [i for i in range(4) if i != drone]
+    assert all(flown.status[-1][i] >= 0 for i in others)
+    assert all(process is None or process.poll() is not None for process in team.processes)
+
+
+def test_an_agent_that_is_started_again_bears_its_share_again():
+    team = swarm(loss=0.0)
+    back: list[int] = []
+
+    def until_it_is_back(cycle, now):
+        if cycle * now.dt > 3.0 and now.flown.status[-1][1] >= 0:
+            back.append(cycle)
+
+    flown = team.run(
+        20.0, [world.Stroke(2.0, 1), world.Stroke(3.0, 1, restart=True)], waits=True, watch=until_it_is_back
+    )  # fmt: skip
+    assert back
+    weight = team.mission.team.load_mass * team.mission.team.gravity
+    tensions = np.linalg.norm(np.array(flown.pulls), axis=2)
+    assert tensions[back[0] - 2, 1] < 0.02 * weight
+    assert tensions[-100:, 1].min() > 0.15 * weight
+    assert flown.missing[-100:].max() < world.WHOLE * weight
+    assert team.sessions == [1, 2, 1, 1]
+
+
+class Ground:
+    """Four drones in one process, with a load that does what they pull."""
+
+    def __init__(self) -> None:
+        mission = load_mission("hover", {**SETTINGS, "load_control.kind": "pid"})
+        self.team = mission.team
+        self.drones = [Drone(mission, i, 1) for i in range(self.team.n)]
+        self.directions = mission.start_directions()
+        self.commands: list[Command] = []
+        self.said: dict[int, bytes] = {}
+        self.cycle = 0
+
+    def run(self, cycles: int, dumb: int = -1, dead: int = -1) -> None:
+        weight = self.team.load_mass * self.team.gravity
+        for _ in range(cycles):
+            pulls = [
+                -np.array(each.direction) * (0.0 if each.number == dead else each.tension)
+                for each in self.commands
+            ]
+            felt = tuple(np.sum(pulls, axis=0)) if pulls else (0.0, 0.0, weight)
+            load = (
+                *self.drones[0].mission.reference.sample(np.zeros(1), self.team)[0, 0],
+                0.0,
+                0.0,
+                0.0,
+            )
+            answers = []
+            for drone in self.drones:
+                i = drone.number
+                tick = Tick(self.cycle, load, felt, (0.0, *self.directions[i]))
+                heard = {j: text for j, text in self.said.items() if j not in (i, dumb, dead)}
+                answers.append(drone.decide(tick, heard))
+            self.commands = [command for command, _ in answers]
+            self.said = {command.number: text for command, text in answers}
+            self.cycle += 1
+
+    def inside(self, of: int, peer: int) -> bool:
+        memory = self.drones[of]._wires["agents"].memory
+        return bool(memory[MEMORY.at.peers + WIDTH * peer + Q.inside])
+
+
+def test_silence_is_not_death_but_a_missing_pull_is():
+    ground = Ground()
+    ground.run(200)
+    ground.run(300, dumb=1)
+    assert all(ground.inside(i, 1) for i in (0, 2, 3))
+    ground.run(100)
+    before = np.array([each.tension for each in ground.commands])
+    ground.run(40, dead=1)
+    assert not any(ground.inside(i, 1) for i in (0, 2, 3))
+    assert all(ground.inside(i, j) for i in (0, 2, 3) for j in (0, 2, 3) if i != j)
+    after = np.array([each.tension for each in ground.commands])
+    assert (after[[0, 2, 3]] > before[[0, 2, 3]]).any()
+    ground.run(100)  # it pulls and speaks again
+    assert all(ground.inside(i, 1) for i in (0, 2, 3))
+
+
+def test_what_goes_over_the_wire_comes_back():
+    tick = Tick(7, (1.0, 2.0, 3.0, 0.5, 0.25, 0.0), (0.0, 0.0, 2.0), (0.5, 0.0, 0.0, -1.0))
+    command = Command(2**40, 3, 2, 0b1011, 0.75, (0.0, 0.6, -0.8), (0.0, 0.25, 2.0))
+    assert protocol.tick_of(protocol.pack_tick(tick)) == tick
+    assert protocol.command_of(protocol.pack_command(command)) == command
+    for data in (b"", b"CLT1", bytes(72), bytes(76), protocol.pack_tick(tick)[:-1]):
+        assert protocol.tick_of(data) is None
+        assert protocol.command_of(data) is None
+
+
+def test_what_a_swarm_cannot_fly_is_refused():
+    for settings, field in (
+        ({}, "agents.kind"),
+        ({**SETTINGS, "load_control.kind": "balance"}, "load_control.kind"),
+    ):
+        with pytest.raises(ColiftError, match=field):
+            world.Swarm(load_mission(NAME, settings), NAME, settings)
