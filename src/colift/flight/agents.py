@@ -15,10 +15,13 @@ from colift.kernel.ports import PORTS, Wire
 
 Sees, Writes = PORTS["agents"].Sees, PORTS["agents"].Writes
 Asked, Answers = PORTS["allocation"].Sees, PORTS["allocation"].Writes
-_agree, carry, _plan = (PORTS[name].invoke for name in ("agents", "network", "allocation"))
+Viewed, Wishes = PORTS["load_control"].Sees, PORTS["load_control"].Writes
+_agree, carry, _plan, _control = (
+    PORTS[name].invoke for name in ("agents", "network", "allocation", "load_control")
+)
 
 SIGNALS = (
-    "force", "steady_force", "reference", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
+    "force", "steady_force", "reference", "load_views", "viewed_load", "viewed_forces", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
     "desired_directions", "outboxes", "agreed_forces", "asking", "asked_forces", "team_tensions", "team_directions",
     "agent_status", "received_tensions", "received_directions",
 )  # fmt: skip
@@ -40,14 +43,38 @@ def rows_of(bus, i):  # type: ignore[no-untyped-def]
 
 
 @register_jitable
-def wish_alike(bus):  # type: ignore[no-untyped-def]
-    """Let all drones want what the one load controller wants, by one clock."""
-    for i in range(bus.members.shape[0]):
+def wish(control, bus, step, time, dt):  # type: ignore[no-untyped-def]
+    """Let each drone's load controller decide what it wants, from its own view of the load; the force of the bus is the mean."""
+    n, sees = bus.members.shape[0], control.sees
+    width = control.memory.shape[0] // n
+    for i in range(n):
         for k in range(3):
-            bus.wishes[i, k] = bus.force[k]
-            bus.steady_wishes[i, k] = bus.steady_force[k]
+            bus.wishes[i, k], bus.steady_wishes[i, k] = bus.force[k], bus.steady_force[k]
+            bus.viewed_load[0, k] = sees.estimated_load[0, k] + bus.load_views[i, 0, k]
+            bus.viewed_load[1, k] = sees.estimated_load[1, k]
+            for m in range(n + 1):
+                bus.viewed_forces[m, k] = sees.estimated_forces[m, k]
+            bus.viewed_forces[n, k] += bus.load_views[i, 1, k]
             for m in range(4):
-                bus.plans[i, m, k] = bus.reference[m, k]
+                bus.plans[i, m, k] = sees.reference[m, k]
+        viewed = Viewed(
+            bus.viewed_load, sees.estimated_load_attitude, sees.estimated_load_rates, sees.reference,
+            sees.reference_attitude, sees.reference_rates, bus.viewed_forces, sees.standing,
+            bus.agreed_forces[i],
+        )  # fmt: skip
+        wishes = Wishes(
+            bus.wishes[i], control.writes.moment, control.writes.learned_load, bus.steady_wishes[i]
+        )
+        own = control.memory[width * i : width * (i + 1)]
+        _control(
+            Wire(control.kernel, control.key, control.params, own, viewed, wishes), step, time, dt
+        )
+    for k in range(3):
+        force = steady = 0.0
+        for i in range(n):
+            force += bus.wishes[i, k] / n
+            steady += bus.steady_wishes[i, k] / n
+        bus.force[k], bus.steady_force[k] = force, steady
 
 
 @register_jitable

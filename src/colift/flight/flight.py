@@ -283,9 +283,7 @@ class Flight:
         memory = {
             layer: fresh
             if layer in anew
-            else self._parts[layer].carry_over(
-                getattr(old.circuit.wires, layer).memory, fresh, places
-            )
+            else self._carried(layer, getattr(old.circuit.wires, layer).memory, fresh, places)
             for layer, fresh in self._fresh_memory(drones, start).items()
         }
         self._begin_leg(drones, memory)
@@ -597,9 +595,22 @@ class Flight:
         return {**memory, "plant": self.mission.plant.initial(real, start)}
 
     def _memory(self, layer: str, part: Part, team: Team) -> Vector:
-        """What a part remembers at first; of an allocator that each drone asks for itself, one after the other."""
-        each = layer == "allocation" and self._leaderless
-        return np.tile(part.memory(team), team.n if each else 1)
+        """What a part remembers at first; of what each drone without a leader has for itself, one after the other."""
+        return np.tile(part.memory(team), team.n if self._of_each(layer) else 1)
+
+    def _of_each(self, layer: str) -> bool:
+        """Whether each drone has this layer for itself: its own load controller, its own questions to the allocator."""
+        return layer in {"load_control", "allocation"} and self._leaderless
+
+    def _carried(self, layer: str, old: Vector, fresh: Vector, places: NDArray[np.int64]) -> Vector:
+        """What a layer remembers in the next leg; of one that each drone has for itself, who stays its own."""
+        part = self._parts[layer]
+        if not (self._of_each(layer) and fresh.size):
+            return part.carry_over(old, fresh, places)
+        before = old.reshape(len(self.drones), -1)
+        rows = zip(fresh.reshape(len(places), -1), places.tolist(), strict=True)
+        kept = [row if at < 0 else part.carry_over(before[at], row, places) for row, at in rows]
+        return np.concatenate(kept)
 
     @property
     def _leaderless(self) -> bool:

@@ -98,7 +98,7 @@ _control_position = PORTS["position_control"].invoke
 _control_attitude = PORTS["attitude_control"].invoke
 _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
 _disturb = PORTS["disturbance"].invoke
-_wish_alike, _decide = agents.wish_alike, agents.decide
+_wish, _decide = agents.wish, agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
@@ -178,14 +178,16 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             )
 
         if k % every.load_control == 0:
-            _control_load(wires.load_control, k, t, every.load_control * dt)
+            if leaderless:
+                _wish(wires.load_control, bus, k, t, every.load_control * dt)
+            else:
+                _control_load(wires.load_control, k, t, every.load_control * dt)
 
         if k % every.allocation == 0:
             row = k // every.allocation - first_cycle
             if leaderless:  # nobody answers for all: what an allocator says of itself is not known
                 begin = monotonic_ns()
                 cycle = k // every.allocation
-                _wish_alike(bus)
                 _decide(
                     wires.network, wires.agents, wires.allocation, bus, cycle, t,
                     every.allocation * dt,

@@ -182,6 +182,9 @@ MESSAGE = 30
 
 MESSAGES = (
     Signal("steady_force", (3,), "N", "-", "world", "part of the wanted force that is not feedback of the moment: planned and learned", writer="load_control"),
+    Signal("load_views", ("n", 2, 3), "m, N", "-", "world", "by how much each drone takes the load to be elsewhere than estimated, and to be pushed otherwise", writer="sensing"),
+    Signal("viewed_load", (2, 3), "m, m/s", "-", "world", "the load as the drone estimates it whose load controller runs"),
+    Signal("viewed_forces", ("n+1", 3), "N", "-", "world", "external forces as that drone knows them"),
     Signal("wishes", ("n", 3), "N", "-", "world", "total force on the load that each drone wants"),
     Signal("steady_wishes", ("n", 3), "N", "-", "world", "the part of each that is not feedback of the moment"),
     Signal("plans", ("n", 4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives, by each drone's clock"),
@@ -192,7 +195,7 @@ MESSAGES = (
     Signal("inboxes", ("n", "n", MESSAGE), "-", "-", "-", "newest message that each drone has of each", writer="network", dtype=np.uint8),
     Signal("heard", ("n", "n"), "1", "-", "-", "1 where a drone's message of another is new in this cycle", writer="network"),
     Signal("agreed_force", (3,), "N", "-", "world", "steady wanted force to which a load controller is drawn; not numbers where it is alone", initial=np.nan),
-    Signal("agreed_forces", ("n", 3), "N", "-", "world", "mean of the steady wishes as each drone knows them", writer="agents"),
+    Signal("agreed_forces", ("n", 3), "N", "-", "world", "mean of the steady wishes as each drone knows them", initial=np.nan, writer="agents"),
     Signal("asking", ("n",), "s", "-", "-", "time since its last question, of each drone that asks the allocator in this cycle", writer="agents"),
     Signal("asked_forces", ("n", 3), "N", "-", "world", "total force for which it asks", writer="agents"),
     Signal("team_tensions", ("n", "n"), "N", "-", "-", "of each drone's picture of the team the tensions: from where the allocator begins, then its answer", writer="agents"),
@@ -237,7 +240,7 @@ OF_ONE = (
     Signal("direction", (3,), "1", "-", "world", "unit direction to the load that it gives it", writer="agents"),
     Signal("outbox", (MESSAGE,), "-", "-", "-", "message to all others", writer="agents", dtype=np.uint8),
     Signal("asking", (1,), "s", "-", "-", "time since the last question, where the mission's allocator is to be asked; else 0. It has answered before the next cycle", writer="agents"),
-    Signal("agreed", (3,), "N", "-", "world", "mean of the steady wishes: what this drone's load controller has learned is drawn there", writer="agents"),
+    Signal("agreed", (3,), "N", "-", "world", "mean of the steady wishes: what this drone's load controller has learned is drawn there; not numbers where nothing is agreed", initial=np.nan, writer="agents"),
     Signal("asked_force", (3,), "N", "-", "world", "for which total force", writer="agents"),
     Signal("team_tensions", ("n",), "N", "-", "-", "from which tensions of the team it begins; then its answer", writer="agents"),
     Signal("team_directions", ("n", 3), "1", "-", "world", "the same of the directions", writer="agents"),

@@ -26,13 +26,15 @@ PARAMS = Layout(
 MEMORY = Layout(team={"mass": 1, "lean": 2})
 """Learned over told mass, less 1, so that zero is the start; force against a steady horizontal one."""
 P, M = PARAMS.at, MEMORY.at
+DRAWN = 0.05
+"""Time in which what is learned is drawn to what a team without a leader has agreed on, s."""
 
 
 @kernel(SIGNATURE)
 def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     load, reference = sees.estimated_load, sees.reference
-    u_L = writes.force
+    u_L, agreed = writes.force, sees.agreed_force
     m, g, k_p, k_d, k_i = params[P.m], params[P.g], params[P.k_p], params[P.k_d], params[P.k_i]
     learn, slope, tangent = params[P.learn], params[P.slope], params[P.tangent]
     lower, upper = params[P.lower], params[P.upper]
@@ -45,6 +47,16 @@ def _adaptive(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
         # m_hat' = -gamma (g e3 + xdd_d) . (edot + lambda e)
         along += regressor * (e_dot + slope * e)
     memory[M.mass] = min(max(memory[M.mass] - dt * learn * along / m, lower - 1.0), upper - 1.0)
+    up = m * (g + reference[2, 2])
+    if (
+        math.isfinite(agreed[0] + agreed[1] + agreed[2]) and up > 0.1 * m * g
+    ):  # what all have learned
+        drawn = min(dt / DRAWN, 1.0)
+        memory[M.mass] += drawn * (agreed[2] / up - 1.0 - memory[M.mass])
+        memory[M.mass] = min(max(memory[M.mass], lower - 1.0), upper - 1.0)
+        for k in range(2):
+            wanted = agreed[k] - m * (1.0 + memory[M.mass]) * reference[2, k]
+            memory[lean + k] += drawn * (wanted - memory[lean + k])
     m_hat = m * (1.0 + memory[M.mass])
     memory[lean] -= dt * k_i * (load[0, 0] - reference[0, 0])
     memory[lean + 1] -= dt * k_i * (load[0, 1] - reference[0, 1])

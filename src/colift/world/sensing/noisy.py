@@ -47,7 +47,7 @@ PARAMS = Layout(
     team={
         **{f"{name}_sensor": SENSOR.size(0) for name in _WIDTHS},
         **{f"{name}_error": QUANTITY.size(0) for name in _QUANTITIES},
-        "first_row": 1, "row": 1, "g": 1, "wild": 1, "wild_place": 1, "wild_turn": 1,
+        "first_row": 1, "row": 1, "g": 1, "wild": 1, "wild_place": 1, "wild_turn": 1, "views": 2,
     }
 )  # fmt: skip
 """``first_row`` and ``row``: begin and length of the drones' rows in memory."""
@@ -60,6 +60,7 @@ MEMORY = Layout(
 )  # fmt: skip
 """Velocity a step ``before``; sum of what was ``felt`` in the ``steps`` since a sample was taken of it."""
 P, S, Q, M = PARAMS.at, SENSOR.at, QUANTITY.at, MEMORY.at
+_VIEWS = 1 << 16  # of random numbers, from one axis of a drone's view of the load to the next
 _NEXT = QUANTITY.size(0)  # from one quantity's numbers to those of the next
 
 
@@ -182,6 +183,11 @@ def _sense(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         if fresh:
             memory[o + M.started] = 1.0
             _draw_biases(memory, bias, 12, key, channel, params, P.position_error)
+            for m in range(6):
+                size = params[P.views + m // 3]
+                writes.load_views[i, m // 3, m % 3] = size * noise.normal(
+                    key, -1, _VIEWS * (m + 1) + channel
+                )
             _draw_biases(
                 memory, bias + 12, 3, key, channel + _FEELING, params, P.specific_force_error
             )
@@ -323,6 +329,11 @@ class Noisy(SensingPart):
     """Body frame, rad/s."""
     specific_force_bias: Bias = 0.05
     """Body frame, m/s^2."""
+    load_view: Size = 0.0
+    """Standard deviation of the place, along each axis, at which each drone without a leader takes the load to be beside what is
+    measured, m: steady, as of a camera of its own."""
+    push_view: Size = 0.0
+    """The same of the force that it takes to push the load, N."""
     load_period: Period = 0.005
     """Time between two samples of the load, s."""
     load_delay: Delay = 0.007
@@ -389,7 +400,13 @@ class Noisy(SensingPart):
             "wild_turn": math.radians(self.load_wild_attitude_deg),
         }  # fmt: skip
         return PARAMS.pack(
-            team.n, first_row=where.rows, row=where.width, g=team.gravity, **wild, **packed
+            team.n,
+            first_row=where.rows,
+            row=where.width,
+            g=team.gravity,
+            views=(self.load_view, self.push_view),
+            **wild,
+            **packed,
         )
 
     def layout(self) -> Layout:
