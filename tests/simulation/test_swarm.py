@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from colift.control.agents._message import SHARE, seal
 from colift.control.agents._pairs import WIDTH, Q
 from colift.control.agents.leaderless import MEMORY
 from colift.errors import ColiftError
 from colift.flight.swarm import protocol, world
 from colift.flight.swarm.agent import Drone
 from colift.flight.swarm.protocol import Command, Tick
+from colift.kernel.math import message
 from colift.mission import load_mission
 
 NAME = "paper-spiral"
@@ -70,14 +72,24 @@ class Ground:
         self.said: dict[int, bytes] = {}
         self.cycle = 0
 
-    def run(self, cycles: int, dumb: int = -1, dead: int = -1) -> None:
+    def run(
+        self, cycles: int, dumb: int = -1, dead: int = -1, idle: int = -1, lies: int = -1
+    ) -> None:
+        """Nobody hears who is ``dumb``; who is ``dead`` neither speaks nor pulls, who is ``idle`` speaks only, and who ``lies`` says more than it does."""
         weight = self.team.load_mass * self.team.gravity
         for _ in range(cycles):
             pulls = [
-                -np.array(each.direction) * (0.0 if each.number == dead else each.tension)
+                -np.array(each.direction) * (0.0 if each.number in (dead, idle) else each.tension)
                 for each in self.commands
             ]
             felt = tuple(np.sum(pulls, axis=0)) if pulls else (0.0, 0.0, weight)
+            self.missing = float(np.linalg.norm(felt - np.array([0.0, 0.0, weight]))) / weight
+            if lies >= 0:
+                text = np.frombuffer(self.said[lies], np.uint8).copy()
+                share = message.get(text, SHARE) + 0.3 * 32767
+                message.put(text, SHARE, share)
+                seal(text, 0, 0, 0)
+                self.said[lies] = text.tobytes()
             load = (
                 *self.drones[0].mission.reference.sample(np.zeros(1), self.team)[0, 0],
                 0.0,
@@ -113,6 +125,28 @@ def test_silence_is_not_death_but_a_missing_pull_is():
     assert (after[[0, 2, 3]] > before[[0, 2, 3]]).any()
     ground.run(100)  # it pulls and speaks again
     assert all(ground.inside(i, 1) for i in (0, 2, 3))
+
+
+def test_who_speaks_and_does_not_pull_is_left_out():
+    ground = Ground()
+    ground.run(300)
+    assert ground.missing < 0.01
+    ground.run(1, idle=1)
+    ground.run(40, idle=1)
+    assert not any(ground.inside(i, 1) for i in (0, 2, 3))
+    ground.run(60, idle=1)
+    assert ground.missing < 0.05
+    assert all(ground.inside(i, j) for i in (0, 2, 3) for j in (0, 2, 3) if i != j)
+
+
+def test_who_lies_about_its_pull_is_left_out_and_nobody_else():
+    ground = Ground()
+    ground.run(300)
+    ground.run(40, lies=1)
+    assert not any(ground.inside(i, 1) for i in (0, 2, 3))
+    ground.run(200, lies=1)
+    assert not any(ground.inside(i, 1) for i in (0, 2, 3))
+    assert all(ground.inside(i, j) for i in (0, 2, 3) for j in (0, 2, 3) if i != j)
 
 
 def test_what_goes_over_the_wire_comes_back():

@@ -23,13 +23,14 @@ from colift.kernel.layout import Layout
 
 PEER = Layout(
     team={
-        "inside": 1, "gone": 1, "holds": 1, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
+        "inside": 1, "gone": 1, "liar": 1, "holds": 1, "doubt": 1, "met": 1, "usual": 3, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
         "state": 1, "version": 1, "code": 1, "r0": 3, "r1": 3, "reach": 1,
         "known": 1, "rb": 3, "seen": 1, "yes": 1, "due": 1,
     }
 )  # fmt: skip
 """What a drone keeps of each peer. ``silent``: cycles since it was heard; ``reach``: share of the way to where it wants to be that is
-offered; ``seen``: version decided last; ``due``: it waits for an answer."""
+offered; ``gone``: left out by what the load did, as a ``liar``
+though it speaks; ``usual``: pull, of one that was ``met``, for a while; ``seen``: version decided last; ``due``: it waits for an answer."""
 Q, WIDTH = PEER.at, PEER.size(0)
 SETTLED, OFFERED, FIRST = 0.0, 1.0, 2.0
 """``state`` of the own reference: r1 is out only in the second."""
@@ -171,13 +172,20 @@ def offer(memory, o, a, x, y, z, least):  # type: ignore[no-untyped-def]
 
 
 @inline
+def here(memory, o):  # type: ignore[no-untyped-def]
+    """Whether planes with the peer at ``o`` are kept: with a liar too, which may still hang there."""
+    there = memory[o + Q.inside] != 0.0 or memory[o + Q.liar] != 0.0
+    return there and memory[o + Q.known] != 0.0
+
+
+@inline
 def allowed(memory, peers, w, a, least, cone):  # type: ignore[no-untyped-def]
     """Whether the direction at place ``w`` is within the cone and on its side of all planes, or no worse than that at ``a``."""
     if -memory[w + 2] < min(cone, -memory[a + 2]):
         return False
     for j in range(MOST):
         o = peers + WIDTH * j
-        if memory[o + Q.inside] == 0.0 or memory[o + Q.known] == 0.0:
+        if not here(memory, o):
             continue
         if not _no_worse(memory, w, a, o + Q.r0, o + Q.rb, least):
             return False

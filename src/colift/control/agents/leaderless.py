@@ -118,6 +118,7 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
         session = (int(text[message.WHO]) >> 4) & 15
         if session != memory[o + Q.session]:
             memory[o + Q.session] = session
+            memory[o + Q.liar] = 0.0
             if memory[o + Q.inside] != 0.0:
                 pairs.stand(memory, o, M.a)
         for k in range(3):
@@ -152,13 +153,18 @@ def _view(sees, memory, me, n, late, started):  # type: ignore[no-untyped-def]
         if memory[o + Q.inside] != 0.0 and memory[o + Q.silent] > late:
             if evidence.missing(memory, o, M.lack, count):
                 memory[o + Q.gone] = 1.0
-        elif memory[o + Q.silent] == 0.0:
+        elif memory[o + Q.doubt] > evidence.SURE:
+            memory[o + Q.gone] = memory[o + Q.liar] = 1.0
+            memory[o + Q.doubt] = 0.0
+            for k in range(3):  # what it usually pulled is what is missing
+                memory[o + Q.share + k] = memory[o + Q.usual + k] + memory[M.mean + k] / count
+        elif memory[o + Q.silent] == 0.0 and memory[o + Q.liar] == 0.0:
             memory[o + Q.gone] = 0.0
         there = there and memory[o + Q.gone] == 0.0
         if there and memory[o + Q.inside] == 0.0:
             memory[o + Q.inside] = 1.0
             pairs.stand(memory, o, M.a)
-            memory[o + Q.silent] = 0.0
+            memory[o + Q.silent] = memory[o + Q.met] = memory[o + Q.doubt] = 0.0
             for k in range(3):
                 if memory[o + Q.count] < 0.0:
                     memory[o + Q.wish + k] = memory[M.steady + k]
@@ -186,7 +192,7 @@ def _push_in(memory, params, x, y, z):  # type: ignore[no-untyped-def]
             o = M.peers + WIDTH * (m >> 1)
             nx, ny, nz, least, rest = 0.0, 0.0, -1.0, params[P.cone] + 1e-6, 0.0
             if m < 2 * MOST:
-                if memory[o + Q.inside] == 0.0 or memory[o + Q.known] == 0.0:
+                if not pairs.here(memory, o):
                     continue
                 if m & 1 == 1 and memory[o + Q.state] != OFFERED:
                     continue
