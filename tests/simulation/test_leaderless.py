@@ -11,7 +11,11 @@ import pytest
 
 from colift.control.agents import _message as message
 from colift.control.agents import leaderless
+from colift.control.agents.base import Status
+from colift.flight.flight import Flight
 from colift.kernel.signals import MESSAGE
+from colift.mission import load_mission
+from colift.mission.warnings import warnings_of
 from colift.study import hostility
 
 SOURCES = Path(leaderless.__file__).parent
@@ -129,3 +133,57 @@ def test_pairs_survive_a_message():
 def test_a_count_is_that_nearest_to_the_own(own):
     for count in range(max(own - 300, 0), own + 300, 7):
         assert message.count_near(count & 0xFFFF, own) == count
+
+
+APART = {
+    "agents.kind": "leaderless", "network": {"kind": "radio", "loss": 0.5, "jitter": 0.02},
+    "sensing": {"kind": "noisy", "load_view": 0.02},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "law"), [("paper-spiral", "pid"), ("real-world-adaptive", "adaptive")]
+)
+def test_load_controllers_that_see_the_load_in_different_places_do_not_drift_apart(name, law):
+    mission = load_mission(name, {**APART, "allocation": {"kind": "safe"}})
+    assert mission.kinds["load_control"] == law
+    flight = Flight(mission)
+    spreads = []
+    for _ in range(4):
+        flight.advance(10.0)
+        assert flight.outcome == "completed"
+        spreads.append(float(np.ptp(flight.bus.steady_wishes, axis=0).max()))
+    weight = mission.team.load_mass * mission.team.gravity
+    assert 0.0 < max(spreads) < 0.1 * weight
+    assert spreads[-1] < 2.0 * spreads[0] + 0.01 * weight
+
+
+def test_drones_leave_and_join_a_team_without_a_leader():
+    flight = Flight(load_mission("real-world", APART))
+    flight.advance(3.0)
+    flight.lose([1])
+    flight.advance(3.0)
+    kept = flight.wires.load_control.memory.copy()
+    assert kept.size == 3 * flight.parts["load_control"].memory(flight.mission.team).size
+    flight.regroup([0, 1, 2, 3])
+    assert (flight.wires.load_control.memory.reshape(4, -1)[[0, 2, 3]].ravel() == kept).all()
+    flight.advance(3.0)
+    assert flight.outcome == "completed"
+    recording = flight.recording()
+    away = np.linalg.norm(recording["load"][:, 0] - recording["reference"][:, 0], axis=1)
+    assert away.max() < 0.4
+    assert not (recording["agent_status"][-1].astype(int) & Status.HOLDING).any()
+
+
+def test_what_stands_in_the_way_is_warned_of():
+    near = {"agents.kind": "leaderless", "allocation": {"kind": "safe", "min_angle_deg": 26.0}}
+    for settings, said in (
+        (near, "leave 4 degrees"),
+        ({"agents.kind": "leaderless"}, "no least angle"),
+    ):
+        warned = [str(each) for each in warnings_of(load_mission("paper-spiral", settings))]
+        assert any("agents.min_angle_deg" in text and said in text for text in warned), warned
+    quiet = {"agents.kind": "leaderless", "allocation": {"kind": "safe"}}
+    assert not [
+        each for each in warnings_of(load_mission("hover", quiet)) if "agents." in str(each)
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -18,8 +18,9 @@ from colift.control.agents._pairs import FIRST, LEAST, OFFERED, SETTLED, WIDTH, 
 from colift.control.agents.base import SIGNATURE, AgentPart, Status
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
-from colift.part import Vector
+from colift.part import Setup, Vector
 from colift.team import Team
+from colift.team.geometry import pairwise_angles
 
 PARAMS = Layout(
     team={
@@ -49,6 +50,8 @@ BALANCE = 0.5
 """Time in which pulls beside the shares come to balance when nobody is asked for the formation, s."""
 CODE = 0.12
 """By how much two directions may be nearer, degrees, than the nearest codes for them."""
+ROOM = 4.0
+"""By how much more than the least angle the allocator should plan, degrees."""
 WISHES, SHARES = 4.0, 1.0
 """Largest wish and pull beside its share that a message can say, in weights of the load."""
 FREE, HOLDING, CLIPPED = int(Status.FREE), int(Status.HOLDING), int(Status.CLIPPED)
@@ -485,6 +488,27 @@ class Leaderless(AgentPart):
     def check(self, team: Team) -> list[tuple[str, str]]:
         few = team.n <= MOST
         return super().check(team) + [("kind", f"is for {MOST} drones at most")] * (not few)
+
+    def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
+        planned = getattr(mission.allocation, "min_angle_deg", None)
+        if planned is None:
+            kind = mission.kinds["allocation"]
+            yield (
+                "min_angle_deg",
+                f'allocation.kind = "{kind}" plans no least angle: planes may stand in its way',
+            )
+        elif planned < self.min_angle_deg + ROOM:
+            yield (
+                "min_angle_deg",
+                f"allocation.min_angle_deg = {planned:g} plans cables where planes at {self.min_angle_deg:g} stand "
+                f"in their way: leave {ROOM:g} degrees between them",
+            )
+        least = math.degrees(pairwise_angles(mission.start_directions()).min(initial=math.pi))
+        if least < self.min_angle_deg:
+            yield (
+                "min_angle_deg",
+                f"cables start {least:.3g} degrees apart (start): they are led apart first",
+            )
 
     def left_open(self, team: Team) -> dict[str, Vector]:
         known = np.isfinite(team.max_thrusts)
