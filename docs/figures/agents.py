@@ -118,7 +118,12 @@ def spread(values: list[float], scale: float = 1e3) -> str:
     rng = np.random.default_rng(0)
     means = found[rng.integers(0, len(found), (4000, len(found)))].mean(axis=1)
     low, high = np.percentile(means, [2.5, 97.5])
-    return f"{found.mean():.3g} ({low:.3g}-{high:.3g})"
+    return f"{short(found.mean())} ({short(low)}-{short(high)})"
+
+
+def short(value: float) -> str:
+    """Three digits; what is rounding is 0."""
+    return "0" if value < 1e-6 else f"{value:.3g}"
 
 
 def curve(
@@ -134,7 +139,7 @@ def curve(
                 each = [run[kind] for run in found[n]]
                 most, angle = max(e["max"] for e in each), min(e["angle"] for e in each)
                 cells.append(
-                    f"{spread([e['rms'] for e in each])}, max {1e3 * most:.3g}, {angle:.0f}°"
+                    f"{spread([e['rms'] for e in each])}, max {short(1e3 * most)}, {angle:.0f}°"
                 )
             lines.append([f"{name}, {kind}", *cells])
     return lines

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from urllib.error import HTTPError
+from urllib.request import urlopen
+
 import numpy as np
 import pytest
 
@@ -14,6 +18,8 @@ from colift.flight.swarm.agent import Drone
 from colift.flight.swarm.protocol import Command, Tick
 from colift.kernel.math import message
 from colift.mission import load_mission
+from colift.show.live.hearing import HearingPage
+from terminal import colift
 
 NAME = "paper-spiral"
 SETTINGS = {"agents.kind": "leaderless", "allocation.kind": "safe", "timing.allocation": 0.01}
@@ -166,3 +172,34 @@ def test_what_a_swarm_cannot_fly_is_refused():
     ):
         with pytest.raises(ColiftError, match=field):
             world.Swarm(load_mission(NAME, settings), NAME, settings)
+
+
+def test_a_page_says_who_hears_whom():
+    page = HearingPage()
+    try:
+        page.say(
+            time=1.5,
+            missing=0.0,
+            weight=2.0,
+            hears=[[0.0, 0.5], [1.0, 0.0]],
+            alive=[True, False],
+            pulls=[1.0, 0.0],
+        )
+        with urlopen(page.address + "state") as answer:
+            assert json.load(answer)["hears"] == [[0.0, 0.5], [1.0, 0.0]]
+        with urlopen(page.address) as answer:
+            assert "Who hears whom" in answer.read().decode()
+        with pytest.raises(HTTPError):
+            urlopen(page.address + "elsewhere")
+    finally:
+        page.close()
+
+
+def test_the_command_flies_kills_and_says_what_came_of_it():
+    result = colift("swarm", "--seconds", "3", "--kill", "2@2", "--wait", "--json")
+    found = json.loads(result.stdout)
+    assert found["tracking_max_m"] < 0.1
+    assert found["killed"][0]["drone"] == 2
+    assert found["killed"][0]["settled"] <= PATIENCE + ALLOWED
+    assert "there is no drone 7" in colift("swarm", "--kill", "7@2").stderr
+    assert "DRONE@TIME" in colift("swarm", "--restart", "7").stderr

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,9 +21,11 @@ from colift.cli.base import (
 
 if TYPE_CHECKING:
     from colift.flight.swarm.world import Stroke, Swarm
+    from colift.show.live.hearing import HearingPage
 
 EVERY = 20
 """Cycles between two pictures."""
+BARS = "▁▂▃▄▅▆▇█"
 
 
 @app.command()
@@ -49,6 +51,7 @@ def swarm(
             help="Let each cycle take as long as its answers do, so that a busy machine changes nothing.",
         ),
     ] = False,
+    page: Annotated[bool, typer.Option(help="Show who hears whom on a page as well.")] = False,
     file: JsonFile = None,
     as_json: Json = False,
 ) -> None:
@@ -79,8 +82,16 @@ def swarm(
                 )
         team = world.Swarm(loaded, mission, overrides, loss=loss)
     show_notes(notes)
-    shown = not as_json and console(stderr=True).is_terminal
-    flown = team.run(seconds, strokes, waits=waits, watch=_show if shown else None)
+    shown = None
+    if page:
+        from colift.show.live.hearing import HearingPage
+
+        shown = HearingPage()
+        console(stderr=True).print(f"Who hears whom: {shown.address}", highlight=False)
+    lines = not as_json and console(stderr=True).is_terminal
+    flown = team.run(seconds, strokes, waits=waits, watch=_Watch(shown, lines=lines))
+    if shown is not None:
+        shown.close()
     weight = loaded.team.load_mass * loaded.team.gravity
     result = flown.summary(strokes, weight)
     save_json(file, result)
@@ -111,26 +122,34 @@ def _strokes(given: list[str] | None, option: str, *, again: bool = False) -> li
     return found
 
 
-def _show(cycle: int, team: Swarm) -> None:
-    """Who hears whom, on one line that is written anew."""
-    if cycle % EVERY:
-        return
-    flown: Any = team.flown
-    rows = flown.hears[-EVERY:]
-    lines = []
-    for i in range(team.n):
-        if flown.status[-1][i] < 0:
-            lines.append(f"{i}: dead")
-            continue
-        shares = [sum(row[i] >> j & 1 for row in rows) / len(rows) for j in range(team.n)]
-        lines.append(
-            f"{i}: "
-            + "".join(
-                "·" if j == i else "▁▂▃▄▅▆▇█"[min(int(8 * s), 7)] for j, s in enumerate(shares)
-            )
-        )
-    missing = 1e3 * float(flown.missing_now())
-    console(stderr=True).print(
-        f"{cycle * team.dt:6.1f} s  {missing:6.0f} mN missing   " + "   ".join(lines),
-        highlight=False, markup=False,
-    )  # fmt: skip
+class _Watch:
+    """Tells a terminal and a page who hears whom, every ``EVERY`` cycles."""
+
+    def __init__(self, page: HearingPage | None, *, lines: bool) -> None:
+        self._page, self._lines = page, lines
+
+    def __call__(self, cycle: int, team: Swarm) -> None:
+        if cycle % EVERY:
+            return
+        flown, n = team.flown, team.n
+        rows, alive = flown.hears[-EVERY:], [status >= 0 for status in flown.status[-1]]
+        shares = [
+            [sum(row[i] >> j & 1 for row in rows) / len(rows) for j in range(n)] for i in range(n)
+        ]
+        time, missing = cycle * team.dt, flown.missing_now()
+        if self._page is not None:
+            body = team.mission.team
+            pulls = [float(sum(pull**2) ** 0.5) for pull in flown.pulls[-1]]
+            self._page.say(
+                time=time, missing=missing, weight=body.load_mass * body.gravity, hears=shares, alive=alive,
+                pulls=pulls,
+            )  # fmt: skip
+        if self._lines:
+            drones = [
+                f"{i}: " + "".join("·" if i == j else BARS[min(int(8 * share), 7)] for j, share in enumerate(row))
+                if alive[i] else f"{i}: dead"
+                for i, row in enumerate(shares)
+            ]  # fmt: skip
+            console(stderr=True).print(
+                f"{time:6.1f} s  {1e3 * missing:6.0f} mN missing   " + "   ".join(drones), highlight=False, markup=False,
+            )  # fmt: skip
