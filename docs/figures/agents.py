@@ -17,6 +17,7 @@ from pages import fill, stored, table
 
 import colift
 from colift.control.agents.base import Status
+from colift.control.agents.exchange_admm import ExchangeAdmm
 from colift.control.agents.leaderless import Leaderless
 from colift.control.allocation.safe import Safe
 from colift.kernel.jit import thread_time_ns
@@ -106,7 +107,9 @@ def rehearsed(
             if name in {"loss", "delay", "jitter"}
         }
     )
+    exchange = Rehearsal(ExchangeAdmm(), Radio(**radio), team, start, key=seed)
     return {
+        "exchange": numbers(exchange.run(asked), asked),
         "agents": numbers(flown.run(asked), asked),
         "central": numbers(commanded(link, team, start, asked, allocation=plan, key=seed), asked),
     }
@@ -133,7 +136,11 @@ def curve(
     lines = [["", *(f"n = {n}" for n in sizes)]]
     for name, (size, rocking, radio) in cases.items():
         found = {n: [rehearsed(n, seed, size, rocking, radio) for seed in seeds] for n in sizes}
-        for kind in ("agents",) if {*radio} & {"burst", "split"} else ("agents", "central"):
+        for kind in (
+            ("agents", "exchange")
+            if {*radio} & {"burst", "split"}
+            else ("agents", "central", "exchange")
+        ):
             cells = []
             for n in sizes:
                 each = [run[kind] for run in found[n]]

@@ -195,3 +195,12 @@ def test_no_number_fits_beyond_the_largest_and_none_is_sent_as_nothing():
     for value, read in ((1e300, 32767.0), (-np.inf, -32767.0), (np.nan, 0.0)):
         message.put(sent, 0, value)
         assert message.get(sent, 0) == read
+
+
+def test_optimal_exchange_balances_the_force_that_all_want():
+    recording = flown(**{"agents.kind": "exchange-admm", "timing.duration": 4.0})
+    assert recording.outcome == "completed"
+    pulls = recording["desired_tensions"][..., None] * recording["desired_directions"]
+    error = np.linalg.norm(pulls.sum(axis=1) + recording["force"], axis=1)
+    weight = recording["force"][-1, 2]
+    assert np.median(error[-500:]) < 0.02 * weight

@@ -36,7 +36,7 @@ Table = named_tuple(
 _allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
 A, SESSION = MEMORY.at.a, MEMORY.at.session
 PULL, STATUS, INNER, WIDTH = 0, 4, 5, 8
-"""Of a drone's row of the outcome: tension and direction, status, direction in its planned frame."""
+"""Of a drone's row of the outcome: tension and direction, status, direction in its planned frame (of ``leaderless`` only)."""
 
 
 @kernel(
@@ -60,7 +60,7 @@ def _rehearse(first, dt, network, agent, allocation, bus, wishes, steady, plans,
                 bus.wishes[i, k] = wishes[row, i, k]
                 bus.steady_wishes[i, k] = steady[row, i, k]
                 bus.plans[i, 2, k] = plans[row, i, k]
-            if events[row, i] == RESTARTS:
+            if events[row, i] == RESTARTS and width > SESSION:
                 session = agent.memory[width * i + SESSION]
                 for m in range(width):
                     agent.memory[width * i + m] = 0.0
@@ -71,7 +71,8 @@ def _rehearse(first, dt, network, agent, allocation, bus, wishes, steady, plans,
             out[row, i, STATUS] = bus.agent_status[i]
             for k in range(3):
                 out[row, i, PULL + 1 + k] = bus.desired_directions[i, k]
-                out[row, i, INNER + k] = agent.memory[width * i + A + k]
+                if width >= A + 3:
+                    out[row, i, INNER + k] = agent.memory[width * i + A + k]
 
 
 @kernel(
