@@ -68,6 +68,7 @@ def test_cables_stay_apart_whatever_is_lost_and_all_agree_once_it_is_calm(n):
 
 
 @pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MUTANTS)
 def test_one_wrong_line_is_caught(name, tmp_path):
     made = mutant(name, tmp_path)
