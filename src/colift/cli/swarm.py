@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,7 +20,7 @@ from colift.cli.base import (
 )
 
 if TYPE_CHECKING:
-    from colift.flight.swarm.world import Stroke, Swarm
+    from colift.flight.swarm.world import Flown, Stroke, Swarm
     from colift.show.live.hearing import HearingPage
 
 EVERY = 20
@@ -82,22 +82,35 @@ def swarm(
                 )
         team = world.Swarm(loaded, mission, overrides, loss=loss)
     show_notes(notes)
+    flown = _fly(team, seconds, strokes, waits=waits, page=page, lines=not as_json)
+    result = flown.summary(strokes, loaded.team.load_mass * loaded.team.gravity)
+    save_json(file, result)
+    if as_json:
+        emit(result)
+        return
+    _tell(result)
+
+
+def _fly(
+    team: Swarm, seconds: float, strokes: list[Stroke], *, waits: bool, page: bool, lines: bool
+) -> Flown:
+    """Fly, and show on the terminal and on a page who hears whom."""
     shown = None
     if page:
         from colift.show.live.hearing import HearingPage
 
         shown = HearingPage()
         console(stderr=True).print(f"Who hears whom: {shown.address}", highlight=False)
-    lines = not as_json and console(stderr=True).is_terminal
-    flown = team.run(seconds, strokes, waits=waits, watch=_Watch(shown, lines=lines))
-    if shown is not None:
-        shown.close()
-    weight = loaded.team.load_mass * loaded.team.gravity
-    result = flown.summary(strokes, weight)
-    save_json(file, result)
-    if as_json:
-        emit(result)
-        return
+    try:
+        watch = _Watch(shown, lines=lines and console(stderr=True).is_terminal)
+        return team.run(seconds, strokes, waits=waits, watch=watch)
+    finally:
+        if shown is not None:
+            shown.close()
+
+
+def _tell(result: dict[str, Any]) -> None:
+    """Say what came of it."""
     out = console()
     out.print(f"Load within {100 * result['tracking_max_m']:.1f} cm of its reference.")
     for each in result["killed"]:
