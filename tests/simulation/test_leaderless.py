@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import colift
 from colift.control.agents import _message as message
 from colift.control.agents import leaderless
 from colift.control.agents.base import Status
@@ -188,3 +189,18 @@ def test_what_stands_in_the_way_is_warned_of():
     assert not [
         each for each in warnings_of(load_mission("hover", quiet)) if "agents." in str(each)
     ]
+
+
+IN_THE_AIR = ("cut-in-flight", "eight-to-seven", "from-rest", "one-drone-path", "point-to-point", "round-obstacles", "three-to-four", "two-drones")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", IN_THE_AIR)
+def test_missions_of_all_kinds_fly_with_agents_as_with_one_allocator(name):
+    flown = [
+        colift.run(name, overrides={"agents.kind": kind}) for kind in ("central", "leaderless")
+    ]
+    central, agents = (run.metrics for run in flown)
+    assert all(run.recording.outcome == "completed" for run in flown)
+    assert agents["tracking_rms_m"] < 1.5 * central["tracking_rms_m"] + 1e-3
+    if flown[0].mission.team.n > 1:
+        assert agents["min_angle_deg"] > min(central["min_angle_deg"], 25.0) - 1.0
