@@ -61,9 +61,11 @@ def test_sensors():
         "specific_force_period": 0.01,
     }
     part = Noisy(
-        **timing, load_period=0.01, tracking_period=0.01, tracking_dropout=0.2, position_bias=0.01
-    )
-    n, histories, ages = 2, [], []
+        **timing, load_period=0.01, tracking_period=0.01, tracking_dropout=0.2, position_bias=0.01,
+        load_view=0.02, push_view=0.1,
+    )  # fmt: skip
+    steady = "load_views"
+    n, histories, ages, views = 2, [], [], []
     for dt in STEPS:
         team, rows, old = Team.uniform(n), [], []
         memory, measured = part.memory(team), {}
@@ -72,13 +74,21 @@ def test_sensors():
             read, _ = part.call(team, memory, step=k, key=11, dt=dt, attitudes=upright, **measured)
             measured = read._asdict()
             old.append(measured["measured_ages"].copy())
-            samples = (m.ravel() for name, m in measured.items() if not name.endswith("_ages"))
+            samples = (
+                m.ravel()
+                for name, m in measured.items()
+                if not name.endswith("_ages") and name != steady
+            )
             rows.append(np.concatenate([*samples]))
+        views.append(measured[steady])
         histories.append(np.array(rows)[:: round(0.01 / dt)])
         ages.append(np.array(old)[:: round(0.01 / dt)])
     # Delays of 7 and 1 ms are no multiples of 2 ms: they are rounded to 8 and 2 ms, before the next row.
     for other in histories[1:]:
         assert_array_equal(other, histories[0])
+    for other in views[1:]:
+        assert_array_equal(other, views[0])
+    assert (views[0] != 0.0).all()
     for other in ages[1:]:  # counted up step by step
         np.testing.assert_allclose(other, ages[0], rtol=0.0, atol=1e-13)
     assert (np.diff(histories[0], axis=0) != 0.0).any(axis=0).all()
