@@ -22,8 +22,10 @@ Progress = Callable[[float, str], None]
 
 FLIGHT = ("colift.flight.loop", "colift.control.reference.descent")
 """Modules with kernels that any flight may call."""
-STUDIES = ("colift.study.bench.timing", "colift.study.latency", "colift.study.safety")
-"""Modules with kernels that only a command of this name calls."""
+STUDIES = (
+    "colift.study.bench.timing", "colift.study.latency", "colift.study.rehearsal", "colift.study.safety",
+)  # fmt: skip
+"""Modules with kernels that no flight calls, but a study."""
 LONGEST = (("allocation", "safe"), ("supervision", "lift"))
 """Parts that take longest to compile: they come first, so that no process is left with one at the end."""
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
