@@ -26,6 +26,7 @@ Imports = Mapping[str, frozenset[str]]
 SAYS = {
     "cli": "the commands, a file each",
     "show": "report, replay, live page",
+    "deploy": "controllers as C",
     "study": "many flights, and what they tell",
     "flight": "the loop; one mission in the air",
     "record": "recordings, metrics, verdicts, real logs",

@@ -256,8 +256,8 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     info[INFO_GAP] = (J - bound) * sigma * sigma
     bits = rigid.at_work(n, rows, pairs, data)
     ux, uy, uz, vx, vy, vz = rigid.left_over(n, f, data)
-    turning = math.sqrt(vx * vx + vy * vy + vz * vz)
-    reduced = balance > 1e-8 * max(1.0, sigma) or turning > 1e-8 * max(1.0, unit)
+    twist = math.sqrt(vx * vx + vy * vy + vz * vz)
+    reduced = balance > 1e-8 * max(1.0, sigma) or twist > 1e-8 * max(1.0, unit)
     cos_cone = math.cos(math.atan(params[P.cone]))
     if relaxed or m > 0:
         cos_box = math.cos(math.atan(params[P.box_angle]))

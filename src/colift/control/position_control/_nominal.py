@@ -8,6 +8,8 @@ that corrections go through.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from colift.control.position_control._cable import course_of, size_of
@@ -56,7 +58,7 @@ def _hold_firm(i, firm, planned, w):  # type: ignore[no-untyped-def]
     Returns what is asked of it along that direction.
     """
     o = 3 * i
-    size = (planned[o] ** 2 + planned[o + 1] ** 2 + planned[o + 2] ** 2) ** 0.5
+    size = math.sqrt(planned[o] ** 2 + planned[o + 1] ** 2 + planned[o + 2] ** 2)
     x, y, z = planned[o] / size, planned[o + 1] / size, planned[o + 2] / size
     along = x * w[o] + y * w[o + 1] + z * w[o + 2]
     u = min(max(0.5 * (along / firm + 1.0), 0.0), 1.0)
@@ -105,7 +107,7 @@ def plan_pulls(n, formation, reference, attitude, rates, learned, dt, keep, para
     px, py, pz = quaternion.into_world(qw, qx, qy, qz, more[0], more[1], more[2])
     fx, fy = m * (reference[2, 0] + ax) + px, m * (reference[2, 1] + ay) + py
     fz = max(m * (reference[2, 2] + az + params[N.g]) + pz, 0.1 * m * params[N.g])
-    W = max((fx * fx + fy * fy + fz * fz) ** 0.5, 1e-9)
+    W = max(math.sqrt(fx * fx + fy * fy + fz * fz), 1e-9)
     wrench.turned(qw, qx, qy, qz, n, levers, ends)
     cos_yaw, sin_yaw = wrench.heading(qw, qx, qy, qz)
     wrench.planned(n, fx, fy, fz, W, cos_yaw, sin_yaw, share, w)

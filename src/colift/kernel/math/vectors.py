@@ -21,8 +21,8 @@ def eliminate_quad(vector, first, second, one, two, a, b, c, d):  # type: ignore
     """
     for k in range(QUAD):
         x, y = vector[one + k], vector[two + k]
-        vector[first + k] -= x * a + y * b
-        vector[second + k] -= x * c + y * d
+        vector[first + k] = vector[first + k] - x * a - y * b
+        vector[second + k] = vector[second + k] - x * c - y * d
 
 
 def add_quad(target, at, source, begin, a):  # type: ignore[no-untyped-def]

@@ -1,0 +1,1 @@
+"""What leaves Python: controllers for other machines."""
