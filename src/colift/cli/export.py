@@ -32,6 +32,10 @@ def export(
     ] = "paper-spiral",
     folder: Annotated[Path, typer.Option("--out", help="Where to write.")] = Path("colift-c"),
     float32: Annotated[bool, typer.Option("--float32", help="Single precision.")] = False,
+    embedded: Annotated[
+        bool,
+        typer.Option("--embedded", help="Single precision, and a bound on the work of a call."),
+    ] = False,
     part: Annotated[
         str | None,
         typer.Option(
@@ -51,10 +55,11 @@ def export(
     [bold]Examples[/bold]
 
       colift export c --set allocation.kind=safe --out allocator --part allocation
+      colift export c --embedded --set allocation.kind=safe --part allocation
       colift export c noisy-spiral --out controllers && make -C controllers check
     """
     check_out(folder, OURS)
-    from colift.deploy.c.layers import LAYERS, pinned
+    from colift.deploy.c.layers import EMBEDDED, LAYERS, SINGLE, pinned
 
     pinned()
     names = several(part) or LAYERS
@@ -68,7 +73,9 @@ def export(
         load_parts(extra)
         loaded = load_mission(mission, parse_overrides(sets))
         show_notes(notes_of(loaded))
-        files = module.files_of(loaded, names, single=float32)
+        if "allocation" in names and (float32 or embedded):
+            loaded = module.profiled(loaded, EMBEDDED if embedded else SINGLE)
+        files = module.files_of(loaded, names, single=float32 or embedded)
     written = module.write(files, folder)
     if as_json:
         emit({"folder": str(folder), "files": sorted(written)})

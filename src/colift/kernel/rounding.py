@@ -35,6 +35,24 @@ WHOLE = 1e-9
 """Missing share of a control period, up to which it counts as whole."""
 NO_TIME = 1e-12
 """Time that is none, s."""
+BALANCED = 1e-10
+"""Error of the force balance that counts as none, in shares of the load."""
+REDUCED = 1e-8
+"""Error of the balance in the answer, relative, above which force is missing."""
+SURE = 1e-12
+"""Margin of a limit from which on an interior-point iteration can start."""
+ROOM = 1e-7
+"""How much worse (cosine) a broken limit may get in one cycle where nothing gives it way."""
+KEPT = 1e-12
+"""A limit that is missed by no more than this is kept."""
+NO_WORSE = 1e-6
+"""Margin (cosine) of a limit up to which nothing may take of it, on the way back."""
+PIVOT = 1e-10
+"""Least pivot of a matrix that counts as positive definite."""
+ON_THE_RIM = 1e-12
+"""How far outside of a bound, relative, a multiplier still is on it."""
+AT_THE_BOUND = 1e-9
+"""How far inside of a bound, relative, a multiplier counts as at it."""
 
 SINGLE = {
     "DOWNWARD": 3e-4,
@@ -51,5 +69,14 @@ SINGLE = {
     "NO_THRUST": 1e-6,
     "WHOLE": 1e-4,
     "NO_TIME": 1e-8,
+    "BALANCED": 2e-6,
+    "REDUCED": 2e-5,
+    "SURE": 1e-6,
+    "ROOM": 5e-6,
+    "KEPT": 1e-5,
+    "NO_WORSE": 5e-6,
+    "PIVOT": 1e-6,
+    "ON_THE_RIM": 1e-6,
+    "AT_THE_BOUND": 1e-5,
 }
 """The values for float32, by name."""

@@ -30,6 +30,7 @@ from colift.errors import Problem, SettingError
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math.columns import column
+from colift.kernel.rounding import KEPT, REDUCED, ROOM, SURE
 from colift.part import Vector
 from colift.team import Team
 from colift.team.geometry import Array, pairwise_angles, ring, widest_gap
@@ -161,7 +162,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     )
     if apart.stacked:
         m = distance.near_ellipsoids(
-            n, m, params[P.reach], delta, params[P.kappa_pair], recovery.SURE, recovery.ROOM, recovery.FIRM,
+            n, m, params[P.reach], delta, params[P.kappa_pair], SURE, ROOM, recovery.FIRM,
             start, apart, work,
         )  # fmt: skip
     heavy = max(1.0, abs(fz) / n)
@@ -204,11 +205,11 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     info[INFO_GAP] = math.nan
     if W > 1e-6 and mu > 0.0 and params[P.equal] != 0.0:
         info[INFO_GAP] = (J - W * W * paper.optimal_objective(n, mu / (W * W))) * sigma * sigma
-    reduced = balance > 1e-8 * max(1.0, sigma)
+    reduced = balance > REDUCED * max(1.0, sigma)
     yielded[0] = min(yielded[0] + 1.0, 1e9) if reduced else 0.0
     if relaxed and cycle.breaks_a_limit(n, order, unit, params, apart, work):
         if apart.capped or apart.stacked:
-            bits = distance.broken(n, apart, recovery.ROUNDING, alpha)
+            bits = distance.broken(n, apart, KEPT, alpha)
             info[INFO_ACTIVE] = float(int(info[INFO_ACTIVE]) | bits)
         return _RECOVERING
     if reduced:

@@ -79,6 +79,25 @@ def layers_of(flight: Flight, names: Iterable[str], *, single: bool = False) -> 
     return found
 
 
+def profiled(mission: Mission, profile: Mapping[str, Mapping[str, float]]) -> Mission:
+    """The mission with an allocator's settings of a profile, where it does not give them itself.
+
+    Raises
+    ------
+    ColiftError
+        For an allocator that the profile does not know.
+
+    """
+    part = mission.allocation
+    kind = kind_of(type(part))
+    if kind not in profile:
+        raise ColiftError(
+            f"allocation.kind: in single precision {' and '.join(profile)} were tried, not {kind}"
+        )
+    changes = {k: v for k, v in profile[kind].items() if k not in part.model_fields_set}
+    return mission.model_copy(update={"allocation": part.model_copy(update=changes)})
+
+
 def files_of(
     mission: Mission, names: Sequence[str] = LAYERS, *, single: bool = False
 ) -> dict[str, str]:

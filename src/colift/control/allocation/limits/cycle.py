@@ -21,6 +21,7 @@ from colift.control.allocation.limits import distance, newton, recovery
 from colift.control.allocation.paper.newton import rotate
 from colift.kernel.jit import inline
 from colift.kernel.layout import Layout
+from colift.kernel.rounding import BALANCED, KEPT, ROOM, SURE
 
 PARAMS = Layout(
     team={
@@ -56,8 +57,6 @@ KEEP = 0.05
 """Part of its margin that every limit keeps in one step."""
 Z_BAND = 10.0
 """Multipliers stay within this factor of kappa / g."""
-BALANCED = 1e-10
-"""Error of the force balance that counts as none, in shares of the load."""
 PATIENCE = 6
 """Steps without the whole force, those at its price twice, after which nothing but force is asked for."""
 FORCE = 0.5
@@ -188,7 +187,7 @@ def set_up(  # type: ignore[no-untyped-def]
     for k in range(3 * n):
         alpha[k] = start[k]
     relaxed = False
-    if recovery.is_broken(n, params[P.cos_angle], cos_cone, recovery.SURE, apart, start):
+    if recovery.is_broken(n, params[P.cos_angle], cos_cone, SURE, apart, start):
         relaxed = True
         recovery.lead_back(n, params[P.min_angle], params[P.cone], delta, start, apart, alpha)
     for i in range(n):
@@ -205,9 +204,9 @@ def set_up(  # type: ignore[no-untyped-def]
         data[d + VERS_RATE] = vers
         # A cable outside the cone: no worse than half of the way that recovery gained.
         data[d + COS_CONE] = cos_cone
-        if -alpha[3 * i + 2] - cos_cone <= recovery.SURE:
+        if -alpha[3 * i + 2] - cos_cone <= SURE:
             middle = -0.5 * (alpha[3 * i + 2] + start[3 * i + 2])
-            data[d + COS_CONE] = min(cos_cone, min(middle, -alpha[3 * i + 2] - recovery.ROOM))
+            data[d + COS_CONE] = min(cos_cone, min(middle, -alpha[3 * i + 2] - ROOM))
         t = tensions[int(order[i])] * unit
         if not (t > 0.0 and t < 1e300):
             t = W / n
@@ -252,7 +251,7 @@ def breaks_a_limit(n, order, unit, params, apart, work):  # type: ignore[no-unty
     """Whether an answer is outside of any limit that :func:`set_up` may have relaxed."""
     data, T, alpha = work.data, work.T, work.alpha
     cos_angle, cos_cone = params[P.cos_angle], params[P.cos_cone]
-    if recovery.is_broken(n, cos_angle, cos_cone, -recovery.ROUNDING, apart, alpha):
+    if recovery.is_broken(n, cos_angle, cos_cone, -KEPT, apart, alpha):
         return True
     if params[P.limits] > 4.0:
         cos_tilt = params[P.cos_tilt]
@@ -263,9 +262,9 @@ def breaks_a_limit(n, order, unit, params, apart, work):  # type: ignore[no-unty
             z = data[d + OWN + 2] - T[i] * alpha[3 * i + 2]
             thrust = math.sqrt(x * x + y * y + z * z)
             most = params[P.rows + P.width * int(order[i]) + P.f_max] * unit
-            if thrust > most * (1.0 + recovery.ROUNDING):
+            if thrust > most * (1.0 + KEPT):
                 return True
-            if z < (cos_tilt - recovery.ROUNDING) * thrust:
+            if z < (cos_tilt - KEPT) * thrust:
                 return True
     return False
 
@@ -333,10 +332,10 @@ def near_pairs(n, limit, edge, kappa, rho, start, apart, work):  # type: ignore[
                 kappa_pair[m] = kappa * fade * fade
                 cos_max[m] = most
                 work.cause[m] = cause
-                if most - c <= recovery.SURE:
+                if most - c <= SURE:
                     old = start[3 * i] * start[3 * j] + start[3 * i + 1] * start[3 * j + 1]
                     old += start[3 * i + 2] * start[3 * j + 2]
-                    cos_max[m] = max(most, max(0.5 * (old + c), c + recovery.ROOM))
+                    cos_max[m] = max(most, max(0.5 * (old + c), c + ROOM))
                     kappa_pair[m] = min(kappa_pair[m], recovery.FIRM * (cos_max[m] - c))
                 if strong[i] == i and newton.is_strong(c, cos_max[m] - c, kappa_pair[m], rho):
                     strong[i] = j

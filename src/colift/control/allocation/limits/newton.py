@@ -53,6 +53,7 @@ from typing import Any, NamedTuple
 from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
 from colift.kernel.math.vectors import QUAD, add_quad, eliminate, solve_quad
+from colift.kernel.rounding import AT_THE_BOUND, ON_THE_RIM, PIVOT
 
 TENSION_MAX, TENSION_MIN, CONE, RATE, THRUST, TILT = range(6)
 LIMITS = 6
@@ -645,12 +646,12 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
             q0 = PITCH * 2 * j
             q1 = q0 + PITCH
             eliminate(Y, PITCH, k0, k1, q0, q1, s00, s01, s10, s11)
-        if not c00 > 1e-10:
+        if not c00 > PIVOT:
             return False
         i0 = 1.0 / math.sqrt(c00)
         l10 = c10 * i0
         c11 -= l10 * l10
-        if not c11 > 1e-10:
+        if not c11 > PIVOT:
             return False
         i1 = 1.0 / math.sqrt(c11)
         K[top + 2 * i] = i0
@@ -684,12 +685,12 @@ def factor_columns(n, shift, work):  # type: ignore[no-untyped-def]
             eliminate(K, 2 * (int(last[k]) - j + 1), c, s, one, two, a00, a01, a10, a11)
             q0 = PITCH * 2 * k
             eliminate(Y, PITCH, y0, y1, q0, q0 + PITCH, a00, a01, a10, a11)
-        if not K[c] > 1e-10:
+        if not K[c] > PIVOT:
             return False
         i0 = 1.0 / math.sqrt(K[c])
         l10 = K[c + 1] * i0
         c11 = K[s + 1] - l10 * l10
-        if not c11 > 1e-10:
+        if not c11 > PIVOT:
             return False
         i1 = 1.0 / math.sqrt(c11)
         for r in range(2, 2 * (int(last[j]) - j + 1)):
@@ -749,7 +750,7 @@ def solve_2x2_disc(a, b, c, x, y, radius):  # type: ignore[no-untyped-def]
         lx = (q * x - b * y) * det
         ly = (p * y - b * x) * det
         norm = math.sqrt(lx * lx + ly * ly)
-        if norm <= radius * (1.0 + 1e-12):
+        if norm <= radius * (1.0 + ON_THE_RIM):
             break
         mx = (q * lx - b * ly) * det
         my = (p * ly - b * lx) * det
@@ -790,7 +791,7 @@ def multiplier(S, bound_h, bound_v, again):  # type: ignore[no-untyped-def]
     if abs(lz) > bound_v:
         lz = math.copysign(bound_v, lz)
         lx, ly = solve_2x2_disc(a, b, c, x - d * lz, y - e * lz, bound_h)
-    active = lx * lx + ly * ly >= bound_h * bound_h * (1.0 - 1e-9) or abs(lz) >= bound_v
+    active = lx * lx + ly * ly >= bound_h * bound_h * (1.0 - AT_THE_BOUND) or abs(lz) >= bound_v
     S[69] = lx
     S[70] = ly
     S[71] = lz

@@ -18,6 +18,7 @@ import math
 
 from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
+from colift.kernel.rounding import NO_WORSE
 
 BUFFER = 0.02
 """Aim this much inside the limits, rad."""
@@ -25,14 +26,8 @@ SHARE = 0.7
 """Part of the rate limit that recovery may use; the optimisation has the rest."""
 SWEEPS = 12
 """Sweeps of the repulsion in one cycle."""
-ROOM = 1e-7
-"""How much worse (cosine) a broken limit may get in one cycle where nothing gives it way."""
 FIRM = 10.0
 """Largest push between two cables that are too close, in shares of the load."""
-SURE = 1e-12
-"""The iteration can start from this margin of a limit on."""
-ROUNDING = 1e-12
-"""A limit that is missed by no more than this is kept."""
 
 
 @inline
@@ -114,19 +109,19 @@ def push_of(n, i, aim, rim, apart, alpha):  # type: ignore[no-untyped-def]
 def is_no_worse(n, i, x, y, z, cos_angle, cos_cone, apart, alpha):  # type: ignore[no-untyped-def]
     """Whether cable i may move to (x, y, z): no kept limit breaks, no broken one gets worse."""
     u, v, w = alpha[3 * i], alpha[3 * i + 1], alpha[3 * i + 2]
-    if -z - cos_cone < min(1e-6, -w - cos_cone):
+    if -z - cos_cone < min(NO_WORSE, -w - cos_cone):
         return False
     for j in range(n):
         if j != i:
             new = x * alpha[3 * j] + y * alpha[3 * j + 1] + z * alpha[3 * j + 2]
             old = u * alpha[3 * j] + v * alpha[3 * j + 1] + w * alpha[3 * j + 2]
             most = distance.cap_of(n, i, j, apart) if apart.capped else cos_angle
-            if most - new < min(1e-6, most - old):
+            if most - new < min(NO_WORSE, most - old):
                 return False
             if apart.stacked:
                 a, b, c = alpha[3 * j], alpha[3 * j + 1], alpha[3 * j + 2]
                 left = distance.room(i, j, apart, x, y, z, a, b, c)
-                if left < min(1e-6, distance.room(i, j, apart, u, v, w, a, b, c)):
+                if left < min(NO_WORSE, distance.room(i, j, apart, u, v, w, a, b, c)):
                     return False
     return True
 

@@ -1,0 +1,190 @@
+"""Exported allocators on other machines, some of them emulated: the same calls there as here."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colift.deploy.c.header import header_of
+from colift.deploy.c.kernels import Kernel
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parent
+EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
+_ARM = ("arm-none-eabi-gcc", *EXACT, "-mthumb", "-mfloat-abi=hard", "-ffunction-sections", "-fdata-sections")  # fmt: skip
+_LINK = ("-nostartfiles", "-Wl,--gc-sections", f"-Wl,-T,{HERE / 'board.ld'}")
+_QEMU = ("qemu-system-arm", "-nographic", "-monitor", "none", "-serial", "none", "-semihosting", "-icount", "shift=6")  # fmt: skip
+
+
+class Machine(NamedTuple):
+    """How code is made for a machine, and run on it."""
+
+    title: str
+    compiler: tuple[str, ...]
+    source: str
+    """What the driver needs of it."""
+    runner: tuple[str, ...] = ()
+    package: str = ""
+    """Debian packages that bring both."""
+    link: tuple[str, ...] = ("-lm",)
+    size: str = "size"
+    """Program that tells the size of code."""
+
+    def missing(self) -> str:
+        """What is missing to use it, or nothing."""
+        tools = [self.compiler[0], *self.runner[:1]]
+        gone = [tool for tool in tools if shutil.which(tool) is None]
+        return f"needs {', '.join(gone)} ({self.package})" if gone else ""
+
+
+MACHINES = {
+    "x86-64": Machine("this machine, gcc", ("gcc", *EXACT), "hosted.c", package="gcc"),
+    "clang": Machine("this machine, clang", ("clang", *EXACT), "hosted.c", package="clang"),
+    "aarch64": Machine(
+        "AArch64 in qemu-user", ("aarch64-linux-gnu-gcc", *EXACT, "-static"), "hosted.c", ("qemu-aarch64",),
+        "gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user",
+    ),
+    "wasm": Machine(
+        "WebAssembly in Node", ("clang", *EXACT, "--target=wasm32-wasi", "--sysroot=/usr"), "hosted.c",
+        ("node", "--no-warnings", str(HERE / "run.mjs")), "clang lld wasi-libc libclang-rt-dev-wasm32 nodejs",
+    ),
+    "m4": Machine(
+        "Cortex-M4F in QEMU", (*_ARM, "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), "board.c",
+        (*_QEMU, "-M", "mps2-an386", "-kernel"), "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm",
+        (*_LINK, "-lm"), "arm-none-eabi-size",
+    ),
+    "m7": Machine(
+        "Cortex-M7 in QEMU", (*_ARM, "-mcpu=cortex-m7", "-mfpu=fpv5-d16"), "board.c",
+        (*_QEMU, "-M", "mps2-an500", "-kernel"), "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm",
+        (*_LINK, "-lm"), "arm-none-eabi-size",
+    ),
+}  # fmt: skip
+"""By name."""
+
+
+class Calls(NamedTuple):
+    """What an allocator is asked, one call after the other.
+
+    Attributes
+    ----------
+    params, memory : array
+        Of its kernel.
+    directions : (n, 3) array
+        Of the cables at first.
+    forces : (calls, 3) array
+        N.
+    moments : (calls, 3) array
+        N m.
+    dt : float
+        From one call to the next, s.
+
+    """
+
+    params: Array
+    memory: Array
+    directions: Array
+    forces: Array
+    moments: Array
+    formation: Array
+    dt: float = 0.01
+
+    def packed(self) -> bytes:
+        """The file that the driver reads."""
+        n = len(self.directions)
+        head = struct.pack("<4id", n, len(self.forces), self.params.size, self.memory.size, self.dt)
+        level = np.array([1.0, 0.0, 0.0, 0.0])
+        vectors = (
+            self.params,
+            self.memory,
+            self.directions,
+            level,
+            self.formation,
+            np.hstack([self.forces, self.moments]),
+        )
+        return head + b"".join(np.ascontiguousarray(each, "<f8").tobytes() for each in vectors)
+
+
+class Answers(NamedTuple):
+    """Of all calls: status, what the allocator says of itself, tensions, directions; instructions and bytes of stack."""
+
+    status: Array
+    info: Array
+    tensions: Array
+    directions: Array
+    instructions: Array
+    stack: int
+
+
+class Driver:
+    """A kernel of an allocator, compiled for a machine together with what calls it; it has a folder, until it is closed.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If the compiler refuses.
+
+    """
+
+    def __init__(
+        self, kernel: Kernel, machine: str, most: tuple[int, int, int], flags: Sequence[str] = ()
+    ) -> None:
+        self.machine, self._stack = MACHINES[machine], ExitStack()
+        self.folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        (self.folder / "colift.h").write_text(header_of([kernel]))
+        (self.folder / "kernel.c").write_text(kernel.file("colift.h"))
+        drones, params, memory = most
+        sizes = [f"-DDRONES={drones}", f"-DPARAMS={params}", f"-DMEMORY={memory}"]
+        made = [
+            f"-DKERNEL={kernel.name}",
+            f"-DREAL={kernel.program.real}",
+            *sizes,
+            f"-I{HERE}",
+            "-I.",
+        ]
+        sources = ["kernel.c", str(HERE / "driver.c"), str(HERE / self.machine.source)]
+        self._run(
+            [*self.machine.compiler, *flags, *made, *sources, *self.machine.link, "-o", "driver"]
+        )
+        self._flags = [*flags, *made]
+
+    def __enter__(self) -> Driver:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Remove its files."""
+        self._stack.close()
+
+    def _run(self, command: Sequence[str]) -> str:
+        done = subprocess.run(
+            command, cwd=self.folder, check=True, text=True, stdout=subprocess.PIPE
+        )
+        return done.stdout
+
+    def __call__(self, calls: Calls) -> Answers:
+        """The answers to these calls."""
+        (self.folder / "calls.bin").write_bytes(calls.packed())
+        self._run([*self.machine.runner, "driver" if self.machine.runner else "./driver"])
+        raw, n = (self.folder / "answers.bin").read_bytes(), len(calls.directions)
+        rows = np.frombuffer(raw[:-4], "<f8").reshape(len(calls.forces), 9 + 4 * n)
+        return Answers(
+            rows[:, 0], rows[:, 2:9], rows[:, 9 : 9 + n], rows[:, 9 + n :].reshape(-1, n, 3), rows[:, 1],
+            struct.unpack("<i", raw[-4:])[0],
+        )  # fmt: skip
+
+    def code(self) -> int:
+        """Bytes of code and constants of the kernel, without the C library's."""
+        self._run([*self.machine.compiler, *self._flags, "-c", "kernel.c", "-o", "kernel.o"])
+        return int(self._run([self.machine.size, "kernel.o"]).splitlines()[1].split()[0])
