@@ -205,21 +205,16 @@ def main() -> None:
     )
     rows = [
         [
-            f"{e['allocator']}, n = {e['drones']}", *(f"{100 * e[c]['converged']:.4g} %" for c in CASES),
+            f"{e['allocator']}, n = {e['drones']}",
+            *(f"{100 * e[c]['converged']:.4g} ({100 * e[c]['in_double']:.4g})" for c in CASES),
+            "{:.3g} ({:.3g})".format(*e["rough"]["missing"]),
             f"{max(e[c]['balance'] for c in CASES):.1e}",
             *(_beyond(e, key) for key in ("angle", "cone", "tension", "turn")),
         ]
         for e in found["single"]
-    ]  # fmt: skip
-    head = [
-        "",
-        *(f"{case}: converged" for case in CASES),
-        "balance",
-        "angle, °",
-        "cone, °",
-        "tension, N",
-        "turn, rad/s",
     ]
+    head = ["", *(f"{c}, %" for c in CASES), "missing, N", "balance"]
+    head += ["angle, °", "cone, °", "tension, N", "turn, rad/s"]
     fill("deploy.md", "single", table(head, rows))
 
 

@@ -62,6 +62,38 @@ def test_allocators_compute_the_same_in_every_bit(machine):
     assert not any(found.values()), {case: wrong for case, wrong in found.items() if wrong}
 
 
+ONE_SINE = """
+import json, sys
+from colift.deploy.c.asked import LIMITED, allocator, calls, the_same
+from colift.deploy.c.kernels import Kernel
+from colift.deploy.c.machines import Driver
+from colift.part import find
+
+found = {}
+for kind, settings in (("sqp", {}), ("safe", {}), ("safe", LIMITED)):
+    part, team = allocator(kind, 16, **settings)
+    asked = calls(part, team, "rough", 15_000, 716)
+    asked = asked._replace(forces=asked.forces[:100], moments=asked.moments[:100])
+    answers = []
+    for machine in ("x86-64", sys.argv[1]):
+        most = 16, asked.params.size, asked.memory.size
+        with Driver(Kernel(find("allocation", kind), kind), machine, most, ["-include", sys.argv[2]]) as driver:
+            answers.append(driver(asked))
+    found[f"{kind} {len(settings)}"] = int((~the_same(*answers)).sum())
+print(json.dumps(found))
+"""
+
+
+@pytest.mark.parametrize("machine", ["wasm", "m7"])
+def test_only_the_c_library_makes_a_difference(machine):
+    # In these calls 16 drones end otherwise there, unless sine, cosine and arc cosine are the same.
+    for each in ("x86-64", machine):
+        if missing := MACHINES[each].missing():
+            pytest.skip(missing)
+    header = Path(__file__).with_name("one_sine.h")
+    assert not any(_pinned(ONE_SINE, machine, str(header)).values())
+
+
 SINGLE = """
 import json
 import numpy as np
