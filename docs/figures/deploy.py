@@ -9,7 +9,6 @@ packages that ``colift.deploy.c.machines`` names.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
@@ -155,54 +154,46 @@ def k(value: float) -> str:
     return f"{value / 1000:.3g} k"
 
 
-def main() -> None:
-    """Write the tables."""
-    found = stored(__file__, measure)
+def of_identity(found: Any) -> str:
+    """Which answers are the same in every bit."""
     rows = [
-        [
-            MACHINES[machine].title,
-            name,
-            *(of(found["identity"][name][case][machine]) for case in CASES),
-        ]
-        for machine in COUNTS
+        [MACHINES[m].title, name, *(of(found[name][case][m]) for case in CASES)]
+        for m in COUNTS
         for name in ALLOCATORS
     ]
-    fill("deploy.md", "identity", table(["machine", "allocator", *CASES], rows))
-    chips = [each for each in found["chip"] if each["profile"] == "single"]
+    return table(["machine", "allocator", *CASES], rows)
+
+
+def of_chip(found: Any) -> str:
+    """What a Cortex-M4F needs."""
     rows = [
         [
             f"{e['allocator']}, n = {e['drones']}", k(e["smooth"]["mean"]),
             *(k(e["noisy"][x]) for x in ("mean", "p99", "max")), k(e["rough"]["max"]),
             str(e["stack"]), str(e["ram"]), f"{e['code'] / 1000:.1f} kB",
         ]
-        for e in chips
+        for e in found
+        if e["profile"] == "single"
     ]  # fmt: skip
-    head = [
-        "",
-        "smooth: mean",
-        "noisy: mean",
-        "99 %",
-        "most",
-        "rough: most",
-        "stack, B",
-        "RAM, B",
-        "code",
-    ]
-    fill("deploy.md", "chip", table(head, rows))
+    head = ["", "smooth: mean", "noisy: mean", "99 %", "most", "rough: most"]
+    return table([*head, "stack, B", "RAM, B", "code"], rows)
+
+
+def of_budget(found: Any) -> str:
+    """What the embedded profile needs at most."""
     rows = [
         [
-            f"{e['allocator']}, n = {e['drones']}",
-            *(k(e[c]["max"]) for c in CASES),
+            f"{e['allocator']}, n = {e['drones']}", *(k(e[c]["max"]) for c in CASES),
             f"{100 * max(e[c]['max'] for c in CASES) / BUDGET:.0f} %",
         ]
-        for e in found["chip"]
+        for e in found
         if e["profile"] == "embedded"
-    ]
-    fill(
-        "deploy.md",
-        "embedded",
-        table(["most instructions of a call", *CASES, "of the budget"], rows),
-    )
+    ]  # fmt: skip
+    return table(["most instructions of a call", *CASES, "of the budget"], rows)
+
+
+def of_single(found: Any) -> str:
+    """What single precision keeps."""
     rows = [
         [
             f"{e['allocator']}, n = {e['drones']}",
@@ -211,11 +202,10 @@ def main() -> None:
             f"{max(e[c]['balance'] for c in CASES):.1e}",
             *(_beyond(e, key) for key in ("angle", "cone", "tension", "turn")),
         ]
-        for e in found["single"]
+        for e in found
     ]
     head = ["", *(f"{c}, %" for c in CASES), "missing, N", "balance"]
-    head += ["angle, °", "cone, °", "tension, N", "turn, rad/s"]
-    fill("deploy.md", "single", table(head, rows))
+    return table([*head, "angle, °", "cone, °", "tension, N", "turn, rad/s"], rows)
 
 
 def _beyond(row: dict[str, Any], key: str) -> str:
@@ -225,6 +215,14 @@ def _beyond(row: dict[str, Any], key: str) -> str:
     return "kept" if worst <= 0.0 else f"{worst:.1e}"
 
 
+def main() -> None:
+    """Write the tables."""
+    found = stored(__file__, measure)
+    fill("deploy.md", "identity", of_identity(found["identity"]))
+    fill("deploy.md", "chip", of_chip(found["chip"]))
+    fill("deploy.md", "embedded", of_budget(found["chip"]))
+    fill("deploy.md", "single", of_single(found["single"]))
+
+
 if __name__ == "__main__":
     main()
-    sys.exit()

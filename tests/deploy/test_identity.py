@@ -62,6 +62,16 @@ def test_allocators_compute_the_same_in_every_bit(machine):
     assert not any(found.values()), {case: wrong for case, wrong in found.items() if wrong}
 
 
+@pytest.mark.parametrize("mission", ["fetch-and-carry", "agile-box", "real-world-adaptive"])
+def test_all_layers_compute_the_same_along_a_flight(mission):
+    if missing := MACHINES["x86-64"].missing():
+        pytest.skip(missing)
+    script = Path(__file__).with_name("beside.py").read_text()
+    found = _pinned(script, mission, "0.6")
+    assert len(found) == 9
+    assert all(calls >= 60 and wrong == 0 for calls, wrong in found.values()), found
+
+
 ONE_SINE = """
 import json, sys
 from colift.deploy.c.asked import LIMITED, allocator, calls, the_same

@@ -80,7 +80,7 @@ def export(
     if as_json:
         emit({"folder": str(folder), "files": sorted(written)})
         return
-    lines = sum(text.count("\n") for name, text in files.items() if name.startswith("colift"))
+    lines = sum(text.count("\n") for text in files.values())
     out.print(
         f"{folder}: {len(written)} files, {lines} lines of C; `make -C {folder} check`",
         markup=False,
