@@ -104,6 +104,31 @@ def test_only_the_c_library_makes_a_difference(machine):
     assert not any(_pinned(ONE_SINE, machine, str(header)).values())
 
 
+INSIDE = """
+import json
+from colift.deploy.c.asked import LIMITED, allocator, calls
+from colift.deploy.c.kernels import Kernel
+from colift.deploy.c.machines import Driver
+from colift.part import find
+
+flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+for kind, settings in (("sqp", {}), ("safe", LIMITED)):
+    for n in (1, 4, 9):
+        part, team = allocator(kind, n, **settings)
+        asked = calls(part, team, "rough", 100, 80 + n)
+        exactly = n, asked.params.size - 1, asked.memory.size - 1  # the driver has room for one more
+        with Driver(Kernel(find("allocation", kind), kind), "x86-64", exactly, flags) as driver:
+            driver(asked)
+print(json.dumps("clean"))
+"""
+
+
+def test_no_place_outside_of_an_array_and_nothing_that_c_leaves_undefined():
+    if missing := MACHINES["x86-64"].missing():
+        pytest.skip(missing)
+    assert _pinned(INSIDE) == "clean"
+
+
 SINGLE = """
 import json
 import numpy as np
