@@ -50,7 +50,7 @@ _TESTS = {math.isfinite: "isfinite", math.isnan: "isnan"}
 _RESERVED = """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool
-    sqrt sin cos tan acos atan atan2 hypot exp copysign fabs abs rint fmod
+    true false I NULL sqrt sin cos tan acos atan atan2 hypot exp copysign fabs abs rint fmod
 """
 _OPEN = "which comes first, the call or the look at an array, is open in C"
 
