@@ -18,7 +18,7 @@ SINGLE = {"sqp": {"tolerance": 1e-4}, "safe": {"tolerance": 3e-5}}
 """Settings of allocators for which single precision was tried: what it reaches, where the mission does not say otherwise."""
 EMBEDDED = {
     "sqp": {"tolerance": 1e-4, "max_iterations": 8},
-    "safe": {"tolerance": 3e-5, "max_iterations": 8},
+    "safe": {"tolerance": 3e-5, "max_iterations": 7},
 }
 """The same with a bound on the work of a call, which the next call goes on with: at most 168,000 instructions of a
 Cortex-M4F for up to four drones."""
