@@ -13,12 +13,13 @@ PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>colift swa
 <style>
 :root { color-scheme: light dark; font: 16px system-ui, sans-serif }
 body { max-width: 50rem; margin: 2rem auto; padding: 0 1rem }
-table { border-collapse: collapse; margin: 1rem 0 } th, td { padding: .4rem .6rem; text-align: right }
-td { border: 1px solid #8886; min-width: 3.2rem; background: color-mix(in srgb, #2a8 calc(var(--share, 0) * 60%), transparent) }
-.dead { opacity: .35 } caption { text-align: left }
+table { border-collapse: collapse } th, td { padding: .4rem .5rem; text-align: right } div { overflow-x: auto }
+td { border: 1px solid #8886; min-width: 2.2rem; background: color-mix(in srgb, #2a8 calc(var(--share, 0) * 60%), transparent) }
+.dead { opacity: .35 }
 </style>
 <h1>Who hears whom</h1><p id="now" role="status">waiting</p>
-<table><caption>Share of the messages of the last 0.2 s: a row hears, a column speaks</caption><tbody id="table"></tbody></table>
+<p>Share of the messages of the last 0.2 s that each drone (row) hears of each other (column), and its pull on the load.</p>
+<div><table><tbody id="table"></tbody></table></div>
 <script>
 const cell = (row, kind, text) => { const made = document.createElement(kind); made.textContent = text; row.append(made); return made };
 async function show() {
@@ -28,9 +29,9 @@ async function show() {
       `${state.time.toFixed(1)} s: ${Math.round(state.missing * 1e3)} mN of ${state.weight.toFixed(1)} N missing`;
     const body = document.getElementById("table"); body.replaceChildren();
     const head = document.createElement("tr"); cell(head, "th", "");
-    state.hears.forEach((_, j) => cell(head, "th", `drone ${j}`)); cell(head, "th", "pulls, N"); body.append(head);
+    state.hears.forEach((_, j) => cell(head, "th", j)); cell(head, "th", "N"); body.append(head);
     state.hears.forEach((shares, i) => {
-      const row = document.createElement("tr"); cell(row, "th", `drone ${i}`);
+      const row = document.createElement("tr"); cell(row, "th", i);
       if (!state.alive[i]) row.className = "dead";
       shares.forEach((share, j) => {
         const made = cell(row, "td", i === j ? "" : state.alive[i] ? `${Math.round(100 * share)} %` : "dead");
