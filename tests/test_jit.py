@@ -11,6 +11,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
 from colift.kernel import jit
@@ -84,6 +85,32 @@ def test_what_is_compiled_in_a_hurry_is_the_same_machine_code() -> None:
 
 
 @needs_jit
+def _last_but(x, k):  # type: ignore[no-untyped-def]
+    x[0] = x[1 - k] + 10.0 * x[-2]
+
+
+@needs_jit
+@pytest.mark.parametrize("ours", [False, True])
+def test_only_kernels_of_colift_go_without_counting_from_the_end(
+    monkeypatch: pytest.MonkeyPatch, ours: bool
+) -> None:
+    """Of those in other files an index may be negative, of all one that is a constant."""
+    if ours:
+        monkeypatch.setattr(_last_but, "__module__", "colift.some.kernel")
+    made = numba.njit(error_model="numpy")(_last_but)
+    with hurried():
+        made.compile(jit.void(jit.vector, jit.i8))
+    (text,) = made.inspect_llvm().values()
+    body = text.partition("define")[2].partition("\n}")[0]
+    assert ("select" in body or "ashr" in body) == (not ours)
+    x = np.array([1.0, 2.0, 3.0, 4.0])
+    made(x, 0)
+    assert x[0] == 32.0
+    if not ours:
+        made(x, 2)
+        assert x[0] == 34.0
+
+
 def test_of_two_processes_one_compiles_a_kernel_and_the_other_waits_for_it(tmp_path: Path) -> None:
     (tmp_path / "shared.py").write_text("""
 from colift.kernel.jit import f8, kernel, vector

@@ -98,6 +98,9 @@ def test_actual_cables_keep_the_limit_less_a_margin_in_every_shipped_mission(mis
     # Where an overload ends, the first cycle in balance may be cut short at the cap: its force is whole all the same.
     codes = flown.recording["allocator_status"]
     short = codes == Status.ITERATION_LIMIT
+    if mission == "leaderless":
+        assert not short.any()  # no allocator answers for all, so none can be counted
+        return
     assert short.sum() == flown.metrics["allocator_failures"] <= (mission == "cut-in-flight")
     assert (flown.recording["allocator_force_residual"][short] < 1e-6).all()
 

@@ -10,7 +10,7 @@ import colift
 
 LINES = 60
 PARAMETERS = 10
-COMPILED = ("inline", "kernel", "register_jitable")
+COMPILED = ("aside", "inline", "kernel", "register_jitable")
 """Decorators of compiled functions."""
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

@@ -136,11 +136,18 @@ def size(
         rigid = question.mission(drones).team.body is not None
     if rigid:
         _size_rigid(question, flown=flown, as_json=as_json)
-        return
+    else:
+        _size_point(question, seeds if flown else 0, as_json=as_json)
+
+
+def _size_point(question: Question, seeds: int, *, as_json: bool) -> None:
+    """Answer for a point load; flown on so many ``seeds``."""
+    from colift.study import size as study
+
     with loading():
         answer = study.size(question)
     flights: list[Flown] = []
-    if flown and (answer.held.ok or answer.asked is not None):
+    if seeds and (answer.held.ok or answer.asked is not None):
         with progress("Flying") as advance:
             flights = study.fly(question, answer, seeds, advance)
     notes = [f"{path} {message}" for path, message in study.notes(answer)]

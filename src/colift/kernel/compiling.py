@@ -15,10 +15,9 @@ from typing import Any
 
 from llvmlite import binding as llvm
 from llvmlite import ir as llvm_ir
-from numba.core import base, codegen, ir, types
+from numba.core import base, codegen, event, ir, types
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
-from numba.np import arrayobj
 
 _OPERATORS = {value for value in vars(operator).values() if callable(value)}
 _NUMBERS = (types.Number, types.Boolean, types.Literal)
@@ -72,25 +71,48 @@ def hurried() -> Iterator[None]:
             yield
             return
         collecting = gc.isenabled()
-        kept = (
-            (types.BaseFunction, "get_call_type", _remembered),
-            (base.BaseContext, "get_function", _known_to_be_missing),
-            (ir.Inst, "_rec_list_vars", lambda _: _variables),
-            (arrayobj, "fix_integer_index", _from_the_start),
-        )
-        before = [(owner, name, getattr(owner, name)) for owner, name, _ in kept]
         gc.disable()
         _depth += 1
+        kept = _Kept()
         try:
-            for owner, name, made in kept:
-                setattr(owner, name, made(getattr(owner, name)))
-            yield
+            kept.replace(types.BaseFunction, "get_call_type", _remembered)
+            kept.replace(base.BaseContext, "get_function", _known_to_be_missing)
+            kept.replace(ir.Inst, "_rec_list_vars", lambda _: _variables)
+            with event.install_listener("numba:compile", kept):
+                yield
         finally:
             _depth -= 1
-            for owner, name, function in before:
-                setattr(owner, name, function)
+            kept.restore()
             if collecting:
                 gc.enable()
+
+
+class _Kept(event.Listener):
+    """Functions of Numba that others stand for, until they are restored."""
+
+    def __init__(self) -> None:
+        self._before: list[tuple[Any, str, Any]] = []
+        self._compiles = False
+
+    def replace(self, owner: Any, name: str, made: Callable[[Any], Any]) -> None:
+        before = getattr(owner, name)
+        self._before.append((owner, name, before))
+        setattr(owner, name, made(before))
+
+    def restore(self) -> None:
+        for owner, name, before in reversed(self._before):
+            setattr(owner, name, before)
+
+    def on_start(self, event: Any) -> None:
+        """Numba compiles, which loads more of it; what is in the cache needs none of that."""
+        if not self._compiles:
+            from numba.np import arrayobj
+
+            self._compiles = True
+            self.replace(arrayobj, "fix_integer_index", _from_the_start)
+
+    def on_end(self, event: Any) -> None:
+        """Others may compile yet."""
 
 
 def _remembered(ask: Callable[..., Any]) -> Callable[..., Any]:

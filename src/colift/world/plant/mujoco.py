@@ -112,20 +112,17 @@ def _scene(params: bytes) -> _Scene:
 
 
 def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
-    dt, attached = now.dt, sees.attached
-    thrusts, torques, external = sees.applied_thrusts, sees.applied_torques, sees.external_forces
+    dt, attached, n = now.dt, sees.attached, sees.attached.shape[0]
     tensions, peak_tensions = writes.tensions, writes.peak_tensions
     catch_impulses, slack_times = writes.catch_impulses, writes.slack_times
     import mujoco
 
     scene = _scene(params.tobytes())
-    model, data, n = scene.model, scene.data, thrusts.shape[0]
+    model, data = scene.model, scene.data
     state, rest, parting = np.split(memory, [state_size(n), memory.size - n])
     warm_start = rest[: model.nv]
-    if not all(
-        np.abs(a).max() < mujoco.mjMAXVAL
-        for a in (thrusts, torques, external, sees.external_moment, state)
-    ):
+    pushes = sees.applied_thrusts, sees.applied_torques, sees.external_forces, sees.external_moment
+    if not all(np.abs(a).max() < mujoco.mjMAXVAL for a in (*pushes, state)):
         state[:] = np.nan  # MuJoCo would go on with other numbers; a flight that diverges shall end
         return
     # MuJoCo would soften, without a word, a limit that its step cannot follow.
@@ -137,11 +134,7 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     lengths = params[MASS + 1 : -SETTINGS : BODY]
     data.qpos[:], data.qvel[:] = state[scene.qpos], state[scene.qvel]
     data.qacc_warmstart[:] = warm_start
-    controls = data.ctrl.reshape(n, 4)
-    controls[:, 0], controls[:, 1:] = thrusts, torques
-    data.xfrc_applied[1, :3] = external[n]
-    data.xfrc_applied[1, 3:] = sees.external_moment
-    data.xfrc_applied[2:, :3] = external[:n]
+    _apply(data, sees)
     reduced = 1.0 / (1.0 / params[MASS:-SETTINGS:BODY] + 1.0 / params[0])
     for substep in range(substeps):
         at = now.time + substep * dt / substeps
@@ -175,6 +168,16 @@ def _step(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if data.warning.number.any():
         mujoco.mj_resetData(model, data)
         state[:] = np.nan
+
+
+def _apply(data: Any, sees: Any) -> None:
+    """What pushes drones and load in this step."""
+    external, n = sees.external_forces, sees.applied_thrusts.shape[0]
+    controls = data.ctrl.reshape(n, 4)
+    controls[:, 0], controls[:, 1:] = sees.applied_thrusts, sees.applied_torques
+    data.xfrc_applied[1, :3] = external[n]
+    data.xfrc_applied[1, 3:] = sees.external_moment
+    data.xfrc_applied[2:, :3] = external[:n]
 
 
 def _ahead(params: Vector) -> Vector:
