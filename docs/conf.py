@@ -19,6 +19,7 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx.ext.napoleon",
     "colift_tables",
+    "colift_try",
 ]
 exclude_patterns = ["_build"]
 source_suffix = {".md": "markdown"}
