@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from colift.deploy.c.cascade import Cascade
 from colift.deploy.c.header import header_of
 from colift.deploy.c.kernels import Kernel
 from colift.deploy.c.layers import LAYERS
@@ -65,6 +66,7 @@ def layers_of(flight: Flight, names: Iterable[str], *, single: bool = False) -> 
     """
     mission, found = flight.mission, []
     periods = flight.mission.timing.multiples()
+    periods |= dict.fromkeys(("observation", "detection"), periods["position_control"])
     for name in names:
         part, wire = getattr(mission, name), getattr(flight.wires, name)
         kind = kind_of(type(part))
@@ -106,8 +108,9 @@ def files_of(
     layers = layers_of(flight, names, single=single)
     vectors = Vectors(flight, layers, CALLS, single=single)
     allocator = next((layer.kernel for layer in layers if layer.name == "allocation"), None)
+    cascade = Cascade(mission, layers) if Cascade.possible(mission, layers) else None
     marks = {
-        "EXAMPLE": "example" if allocator else "",
+        "EXAMPLE": " ".join(["example"] * bool(allocator) + ["example_cascade"] * bool(cascade)),
         "MORE_FLAGS": "-Wdouble-promotion" if single else "",
         "ALLOCATE": allocator.name if allocator else "",
         "REAL": layers[0].kernel.program.real,
@@ -115,7 +118,12 @@ def files_of(
     files = {f"{layer.kernel.name}.c": layer.kernel.file("colift.h") for layer in layers}
     files["colift.h"] = header_of([layer.kernel for layer in layers])
     files["colift_team.h"], files["colift_team.c"] = _team(layers, len(flight.drones))
-    files["test_vectors.h"], files["test.c"] = vectors.data(), vectors.program()
+    table, tests = "", {}
+    if cascade:
+        files |= cascade.files()
+        if not single:  # in which a memory goes its own way
+            table, tests["cascade"] = cascade.test()
+    files["test_vectors.h"], files["test.c"] = vectors.data() + table, vectors.program(tests)
     for name in ("Makefile", "README.md", "LICENSE", *(["example.c"] if allocator else [])):
         files[name] = template(name, marks)
     return files

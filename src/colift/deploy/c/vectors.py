@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,19 +45,21 @@ class Vectors:
             rows = self.rows[layer.name]
             lines += [f"static const {real} {layer.name}_calls[{len(rows)}][{rows[0].size}] = {{"]
             for row in rows:
-                lines += ["    {", *_folded([_hex(v, self.single) for v in row]), "    },"]
+                lines += ["    {", *folded([hexadecimal(v, self.single) for v in row]), "    },"]
             lines += ["};", ""]
         return "\n".join(lines)
 
-    def program(self) -> str:
-        """The program that calls the kernels and compares."""
+    def program(self, further: Mapping[str, str]) -> str:
+        """The program that calls the kernels and compares; ``further`` tests by name."""
         real = self.layers[0].kernel.program.real
-        tests = "\n\n".join(self._test(layer, real) for layer in self.layers)
-        calls = "\n".join(f"    wrong += test_{layer.name}();" for layer in self.layers)
+        made = {layer.name: self._test(layer, real) for layer in self.layers} | dict(further)
+        tests = "\n\n".join(made.values())
+        calls = "\n".join(f"    wrong += test_{name}();" for name in made)
         within = "1e-3f" if self.single else "0.0"
         return template(
             "test.c",
             {
+                "HEADER": "colift_cascade.h" if further else "colift.h",
                 "TESTS": tests,
                 "CALLS": calls,
                 "REAL": real,
@@ -69,7 +71,7 @@ class Vectors:
     def _test(self, layer: Layer, real: str) -> str:
         """The function that tests one kernel."""
         port, kernel = PORTS[layer.name], layer.kernel
-        sees, writes = _fields(kernel.sees), _fields(kernel.writes)
+        sees, writes = fields_of(kernel.sees), fields_of(kernel.writes)
         sizes = {
             name: int(np.prod(port.table[name].shape_for(self.n))) for name in (*sees, *writes)
         }
@@ -108,7 +110,8 @@ static int pulls_otherwise(const float *found, const float *wanted, int n)
 """For allocators in single precision."""
 
 
-def _fields(kind: Any) -> list[str]:
+def fields_of(kind: Any) -> list[str]:
+    """Names of the arrays of a struct."""
     return [
         name for name, each in zip(kind.made._fields, kind.each, strict=True) if each != NOTHING
     ]
@@ -130,7 +133,7 @@ def _call(flight: Flight, layer: Layer) -> Any:
     step, time = round(flight.time / flight.mission.timing.step), flight.time
 
     def flat(of: Any, kind: Any) -> list[Any]:
-        return [getattr(of, name).ravel() for name in _fields(kind)]
+        return [getattr(of, name).ravel() for name in fields_of(kind)]
 
     before = [*flat(sees, layer.kernel.sees), *flat(writes, layer.kernel.writes), memory.copy()]
     before = [each.copy() for each in before]
@@ -140,7 +143,8 @@ def _call(flight: Flight, layer: Layer) -> Any:
     return np.concatenate([[step, time, layer.period], *before, [status or 0], *after])
 
 
-def _hex(value: float, single: bool) -> str:
+def hexadecimal(value: float, single: bool) -> str:
+    """A number as it is, in every bit."""
     if np.isnan(value):
         return "NAN"
     if np.isinf(value):
@@ -150,7 +154,8 @@ def _hex(value: float, single: bool) -> str:
     return f"{float(np.float32(value)).hex()}f" if single else float(value).hex()
 
 
-def _folded(words: Sequence[str], width: int = 100) -> list[str]:
+def folded(words: Sequence[str], width: int = 100) -> list[str]:
+    """Words in lines, with a comma behind each."""
     lines, line = [], "       "
     for word in words:
         if len(line) + len(word) + 2 > width:

@@ -1,6 +1,6 @@
 // Compare the kernels with the answers of Python: the same in every bit, where neither compiler fuses or reorders.
 
-#include "colift.h"
+#include "@HEADER@"
 #include "colift_team.h"
 
 #include <math.h>
