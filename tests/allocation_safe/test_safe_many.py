@@ -15,7 +15,7 @@ from colift.team.geometry import pairwise_angles
 
 
 def _eliminate(numbers):  # type: ignore[no-untyped-def]
-    vectors.eliminate_quad(numbers, 3, 40, 71, 101, 0.3, -1.7, 2.9, 0.6)
+    vectors.eliminate(numbers, 4, 3, 40, 71, 101, 0.3, -1.7, 2.9, 0.6)
 
 
 def _add(numbers):  # type: ignore[no-untyped-def]
@@ -23,7 +23,7 @@ def _add(numbers):  # type: ignore[no-untyped-def]
 
 
 def _solve(numbers):  # type: ignore[no-untyped-def]
-    vectors.solve_quad(numbers, 3, 40, 0.3, -1.7, 2.9)
+    vectors.solve(numbers, 4, 3, 40, 0.3, -1.7, 2.9)
 
 
 @pytest.mark.parametrize(

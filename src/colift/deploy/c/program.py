@@ -12,7 +12,7 @@ from colift.deploy.c.source import Source
 from colift.deploy.c.translate import Translation
 from colift.deploy.c.types import BOOL, INT, NOTHING, REAL, Array, Tuple, Type, bare
 from colift.kernel import rounding
-from colift.kernel.math.vectors import add_quad, eliminate_quad, solve_quad
+from colift.kernel.math.vectors import add_quad, eliminate, solve
 
 _LEAST, _MOST = 2.0**-126, 3.4028234e38
 """Sizes of numbers of single precision."""
@@ -50,7 +50,7 @@ class Program:
 
     """
 
-    as_they_are = (add_quad, eliminate_quad, solve_quad)
+    as_they_are = (add_quad, eliminate, solve)
     """Functions that Numba has its own code for, and C takes as they are written."""
 
     def __init__(self, *, single: bool = False) -> None:

@@ -8,34 +8,32 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
-from colift.kernel.jit import inline
-
 QUAD = 4
 """Numbers in one step. Columns are as long as a multiple of it; what is behind their end is zero."""
 
 
-def eliminate_quad(vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
+def eliminate(vector, count, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
     """Take columns ``one`` and ``two`` of an array, in the ratios (a, b) and (c, d), from its columns ``first`` and ``second``.
 
-    Of each the four numbers from that place on.
+    Of each ``count`` numbers from that place on; compiled by Numba, whole quads.
     """
-    for k in range(QUAD):
+    for k in range(count):
         x, y = vector[one + k], vector[two + k]
         vector[first + k] = vector[first + k] - x * a - y * b
         vector[second + k] = vector[second + k] - x * c - y * d
+
+
+def solve(vector, count, first, second, a, b, c):  # type: ignore[no-untyped-def]
+    """Solve for ``count`` columns, or whole quads of them as above: ``first`` becomes x = a first, ``second`` c (second - b x)."""
+    for k in range(count):
+        vector[first + k] *= a
+        vector[second + k] = (vector[second + k] - b * vector[first + k]) * c
 
 
 def add_quad(target, at, source, begin, a):  # type: ignore[no-untyped-def]
     """Add four numbers of an array, from ``begin`` on, times a to four of another, or of the same."""
     for k in range(QUAD):
         target[at + k] += a * source[begin + k]
-
-
-def solve_quad(vector, first, second, a, b, c):  # type: ignore[no-untyped-def]
-    """Solve for four columns at once: ``first`` becomes x = a first, ``second`` becomes c (second - b x)."""
-    for k in range(QUAD):
-        vector[first + k] *= a
-        vector[second + k] = (vector[second + k] - b * vector[first + k]) * c
 
 
 _four = ir.VectorType(ir.DoubleType(), QUAD)
@@ -110,27 +108,27 @@ def _solve(typingctx, vector, first, second, a, b, c):  # type: ignore[no-untype
 _eliminate_quad: Any = _eliminate
 _add_quad: Any = _add
 _solve_quad: Any = _solve
+_INSIDE: Any = {"forceinline": True, "error_model": "numpy"}
 
 
-@overload(eliminate_quad, inline="always")
-def _overload_eliminate(vector, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
-    return lambda vector, first, second, one, two, a, b, c, d: _eliminate_quad(
-        vector, first, second, one, two, a, b, c, d
-    )
+@overload(eliminate, jit_options=_INSIDE)
+def _overload_eliminate(vector, count, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
+    def quads(vector, count, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
+        for k in range(0, count, QUAD):
+            _eliminate_quad(vector, first + k, second + k, one + k, two + k, a, b, c, d)
+
+    return quads
+
+
+@overload(solve, jit_options=_INSIDE)
+def _overload_solve(vector, count, first, second, a, b, c):  # type: ignore[no-untyped-def]
+    def quads(vector, count, first, second, a, b, c):  # type: ignore[no-untyped-def]
+        for k in range(0, count, QUAD):
+            _solve_quad(vector, first + k, second + k, a, b, c)
+
+    return quads
 
 
 @overload(add_quad, inline="always")
 def _overload_add(target, at, source, begin, a):  # type: ignore[no-untyped-def]
     return lambda target, at, source, begin, a: _add_quad(target, at, source, begin, a)
-
-
-@overload(solve_quad, inline="always")
-def _overload_solve(vector, first, second, a, b, c):  # type: ignore[no-untyped-def]
-    return lambda vector, first, second, a, b, c: _solve_quad(vector, first, second, a, b, c)
-
-
-@inline
-def eliminate(vector, count, first, second, one, two, a, b, c, d):  # type: ignore[no-untyped-def]
-    """:func:`eliminate_quad` for ``count`` numbers of each column, which is rounded up to whole quads."""
-    for k in range(0, count, QUAD):
-        eliminate_quad(vector, first + k, second + k, one + k, two + k, a, b, c, d)

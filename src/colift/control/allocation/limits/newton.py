@@ -52,7 +52,7 @@ from typing import Any, NamedTuple
 
 from colift.control.allocation.limits import distance
 from colift.kernel.jit import inline
-from colift.kernel.math.vectors import QUAD, add_quad, eliminate, solve_quad
+from colift.kernel.math.vectors import add_quad, eliminate, solve
 from colift.kernel.rounding import AT_THE_BOUND, ON_THE_RIM, PIVOT
 
 TENSION_MAX, TENSION_MIN, CONE, RATE, THRUST, TILT = range(6)
@@ -645,7 +645,7 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
             c11 -= s10 * s10 + s11 * s11
             q0 = PITCH * 2 * j
             q1 = q0 + PITCH
-            eliminate(Y, PITCH, k0, k1, q0, q1, s00, s01, s10, s11)
+            eliminate(Y, RHS, k0, k1, q0, q1, s00, s01, s10, s11)
         if not c00 > PIVOT:
             return False
         i0 = 1.0 / math.sqrt(c00)
@@ -657,8 +657,7 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
         K[top + 2 * i] = i0
         K[low + 2 * i] = l10
         K[low + 2 * i + 1] = i1
-        for k in range(0, PITCH, QUAD):
-            solve_quad(Y, k0 + k, k1 + k, i0, l10, i1)
+        solve(Y, RHS, k0, k1, i0, l10, i1)
     return True
 
 
@@ -684,7 +683,7 @@ def factor_columns(n, shift, work):  # type: ignore[no-untyped-def]
             a00, a01, a10, a11 = K[one], K[two], K[one + 1], K[two + 1]
             eliminate(K, 2 * (int(last[k]) - j + 1), c, s, one, two, a00, a01, a10, a11)
             q0 = PITCH * 2 * k
-            eliminate(Y, PITCH, y0, y1, q0, q0 + PITCH, a00, a01, a10, a11)
+            eliminate(Y, RHS, y0, y1, q0, q0 + PITCH, a00, a01, a10, a11)
         if not K[c] > PIVOT:
             return False
         i0 = 1.0 / math.sqrt(K[c])
@@ -697,8 +696,7 @@ def factor_columns(n, shift, work):  # type: ignore[no-untyped-def]
             K[c + r] *= i0
             K[s + r] = (K[s + r] - l10 * K[c + r]) * i1
         K[c], K[c + 1], K[s + 1] = i0, l10, i1
-        for k in range(0, PITCH, QUAD):
-            solve_quad(Y, y0 + k, y1 + k, i0, l10, i1)
+        solve(Y, RHS, y0, y1, i0, l10, i1)
     return True
 
 
