@@ -77,6 +77,14 @@ class MissionError(ColiftError):
         return f"{self.source}: {count}\n{lines}"
 
 
+class SceneError(MissionError):
+    """A scene to plan in is not valid; carries every problem that was found."""
+
+
+class PlanError(ColiftError):
+    """No plan was found, or a file holds none; the message says why."""
+
+
 class VehicleError(ColiftError):
     """The numbers of a drone cannot be read or are none that a drone can have; names the file and the field."""
 

@@ -1,0 +1,67 @@
+"""`colift plan`: take the whole team through a scene of obstacles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from colift.cli.base import Json, JsonFile, app, console, emit, loading, progress, save_json
+
+
+@app.command()
+def plan(
+    scene: Annotated[Path, typer.Argument(help="Scene, a YAML file of the public kind.")],
+    drones: Annotated[
+        int | None,
+        typer.Option(help="Number of drones, in a cone; default: the scene's team.", min=2, max=16),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Which guesses are tried.", min=0)] = 0,
+    seconds: Annotated[
+        float, typer.Option(help="Look for shorter plans no longer than this, s.", min=0, max=3600)
+    ] = 3.0,
+    attempts: Annotated[int, typer.Option(help="Guesses at most.", min=1, max=10_000)] = 12,
+    npz: Annotated[
+        Path | None, typer.Option("--npz", help="Write the trajectory here, sampled at 1 kHz.")
+    ] = None,
+    file: JsonFile = None,
+    as_json: Json = False,
+) -> None:
+    """Plan load, cables and drones through a scene: exact dynamics, certified by dense sampling.
+
+    Guesses are made from the seed, optimised one after another, and the shortest plan is kept that holds every limit: motors, rates, taut
+    cables, distances between drones and to obstacles.
+    """
+    import numpy as np
+
+    with loading():
+        from colift.plan import planner
+        from colift.plan.scene import load_scene
+    found = load_scene(scene)
+    if drones is not None and drones != len(found.lengths):
+        found = replace(found, directions=None, lengths=np.full(drones, found.lengths[0]))
+    with progress("Planning") as advance:
+        best = planner.plan(found, seed=seed, seconds=seconds, attempts=attempts, progress=advance)
+    result: dict[str, Any] = {
+        "scene": found.name, "drones": len(found.lengths), "seed": seed, "duration": best.duration, "excess": best.excess,
+        "guess": best.guess, "start_moved_deg": best.moved_deg, "first_s": best.first, "total_s": best.total,
+    }  # fmt: skip
+    if npz is not None:
+        planner.save(best, npz)
+        result["npz"] = npz
+    save_json(file, result)
+    if as_json:
+        emit(result)
+        return
+    out = console()
+    out.print(f"{found.name}, {len(found.lengths)} drones: {best.duration:.3f} s", highlight=False)
+    for kind, value in best.excess.items():
+        if value > -1e6:
+            out.print(f"  {kind:>10}  {-value:.4g} to its limit", highlight=False)
+    if best.moved_deg > 0.5:
+        out.print(
+            f"  the start's cables were turned by up to {best.moved_deg:.1f} degrees: they could not rest",
+            highlight=False,
+        )

@@ -1,0 +1,1 @@
+"""Plans for the whole team: load, cables and drones through a scene of obstacles, exact and certified."""
