@@ -25,7 +25,7 @@ def window(n=3, gap=0.4):
 
 @pytest.fixture(scope="module")
 def found():
-    return planner.plan(window(), seed=1, attempts=4)
+    return planner.plan(window(), seed=1, attempts=4, seconds=np.inf)
 
 
 def test_a_plan_holds_newtons_equations_of_load_drones_and_cables(found):
@@ -93,7 +93,7 @@ def test_the_certificate_sees_what_dense_distances_see(found):
 
 
 def test_the_same_seed_gives_the_same_plan(found):
-    again = planner.plan(window(), seed=1, attempts=4)
+    again = planner.plan(window(), seed=1, attempts=4, seconds=np.inf)
     assert np.array_equal(again.load_points, found.load_points)
     assert again.duration == found.duration
 

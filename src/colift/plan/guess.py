@@ -113,6 +113,10 @@ def path(
     return line
 
 
+WIDE = 0.25
+"""By which a stretched post is thicker along the path, m, so that the way out is the load's side."""
+
+
 def one_sided(places: Numbers, obstacles: Numbers, far: float = 1.0) -> Numbers:
     """The obstacles, thin posts stretched by ``far``, m, away from the load's path: what has to pass them all on its side.
 
@@ -128,6 +132,7 @@ def one_sided(places: Numbers, obstacles: Numbers, far: float = 1.0) -> Numbers:
         o[0] = BOX
         o[1 + axis] -= np.sign(nearest[axis]) * far / 2
         o[4 + axis] += far / 2
+        o[5 - axis] += WIDE
     return out
 
 
