@@ -64,6 +64,9 @@ def kernel(signature: Any, *, counted: bool = True) -> Callable[[F], F]:
 
     Not ``counted`` is one in which nobody counts who refers to an array: it makes and returns none, and calls others by
     their address, to each of which a call would cost as much as a small kernel takes.
+
+    In colift's own files an index that is no constant is a place from the start, never negative, and nothing checks it
+    (:mod:`colift.kernel.compiling`); in others' it is Python's.
     """
 
     def decorate(function: F) -> F:

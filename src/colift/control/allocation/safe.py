@@ -54,8 +54,6 @@ MEMORY = Layout(
 """In columns; those of every limit, of every pair, and the matrix ``K`` follow. A team that changes starts anew."""
 LIMIT = Layout(drone={"g": 1, "g_new": 1, "z": 1})
 PAIR = Layout(drone={"kappa": 1, "cos_max": 1, "both": 2, "cause": 1, "root": 1})
-MASK = 0xFFFFF
-"""No team has more drones: so told, the compiler knows that no index along the team is negative."""
 C, L, N, P = MEMORY.at, LIMIT.at, PAIR.at, cycle.PARAMS.at
 CABLES, LIMITS, PAIRS = MEMORY.spans, LIMIT.spans, PAIR.spans
 
@@ -66,7 +64,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
     force, acceleration = sees.force, sees.reference[2]
     tensions, directions = writes.desired_tensions, writes.desired_directions
     info = writes.allocator_info
-    n = tensions.shape[0] & MASK
+    n = tensions.shape[0]
     most = n * (n - 1)  # angle and ellipsoid of every pair
     count = newton.LIMITS * n + most
     limits = C.rows + C.width * n

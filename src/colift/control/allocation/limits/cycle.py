@@ -9,7 +9,7 @@ barrier fades to zero at that distance, so that nothing jumps when a pair enters
 (:mod:`colift.control.allocation.limits.distance`) ``min_angle`` is the widest angle that any pair keeps, and ellipsoids that may touch are
 further rows.
 
-This file imports only the compiler front end and the names of places.
+This file imports only the compiler front end, names of places and thresholds.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ inverse of a cable's matrix and ``A`` all rows, the multipliers follow from ``(s
 of the wrench that may give way has ``D = s+/z+ + s-/z-`` of its slack ``s+ - s-``, whose multipliers are ``z+- = price -+ lam``; else zero.
 Slacks are what is missing at every iterate, from the first one on, so what is missing never grows by more than the barrier.
 
-This file imports only the compiler front end and the names of places.
+This file imports only the compiler front end, names of places and thresholds.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ import math
 from colift.control.allocation.limits import metres
 from colift.kernel.jit import inline
 from colift.kernel.layout import Layout
+from colift.kernel.rounding import BALANCED
 
 T_MAX, T_MIN, CONE, RATE, BOX, POWER, TILT = range(7)
 LIMITS = 7
@@ -66,8 +67,6 @@ SHARE = 0.02
 """Of what is missing, weighted by its prices: what barriers may be blamed for in the end."""
 FLOOR = 1e-9
 """Smallest barrier, in squared shares."""
-BALANCED = 1e-10
-"""Missing wrench that counts as none, in shares."""
 NEAR = 10.0
 """Squared residual over the barrier, up to which the barrier may shrink: rims are curved, and steps along them have to stay inside."""
 TRIES = 8

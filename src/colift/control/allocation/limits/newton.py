@@ -42,7 +42,7 @@ on the multiplier, a problem in three unknowns after the elimination. Inside the
 ``E_v >> E_h``, the horizontal part gives way first. When the bounds rise and fall: :func:`colift.control.allocation.limits.cycle.iterate`.
 
 Source: own derivation; interior point as in Nocedal and Wright, Numerical Optimization, ch. 19.
-This file imports only the compiler front end and the limits on distances.
+This file imports only the compiler front end, thresholds and the limits on distances.
 """
 
 from __future__ import annotations
@@ -616,15 +616,9 @@ def factor_square(n, shift, work):  # type: ignore[no-untyped-def]
             lj = tj + size
             s00, s01 = K[top + 2 * j], K[top + 2 * j + 1]
             s10, s11 = K[low + 2 * j], K[low + 2 * j + 1]
-            for k in range(2 * int(max(first[i], first[j])), 2 * j, 2):
+            for k in range(2 * int(max(first[i], first[j])), 2 * j):
                 x0, x1 = K[top + k], K[low + k]
                 y0, y1 = K[tj + k], K[lj + k]
-                s00 -= x0 * y0
-                s01 -= x0 * y1
-                s10 -= x1 * y0
-                s11 -= x1 * y1
-                x0, x1 = K[top + k + 1], K[low + k + 1]
-                y0, y1 = K[tj + k + 1], K[lj + k + 1]
                 s00 -= x0 * y0
                 s01 -= x0 * y1
                 s10 -= x1 * y0

@@ -9,7 +9,7 @@ hold up the others.
 
 Coincident cables have no direction to part in: the golden angle gives each its own.
 
-This file imports only the compiler front end and the limits on distances.
+This file imports only the compiler front end, thresholds and the limits on distances.
 """
 
 from __future__ import annotations

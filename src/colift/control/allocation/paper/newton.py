@@ -33,7 +33,7 @@ Feasible path. After a step, the second-order residual ``r`` of the force balanc
 coordinates, ``T_i alpha_i <- T_i (alpha_i - r / sum T)``: every iterate satisfies force balance, unit norms and
 ``T >= 0``, so the objective itself is the merit function and any iterate is a usable command.
 
-This file imports only the compiler front end: it can be built for other targets.
+This file imports only the compiler front end and thresholds: it can be built for other targets.
 """
 
 from __future__ import annotations
