@@ -23,7 +23,7 @@ Progress = Callable[[float, str], None]
 FLIGHT = ("colift.flight.loop", "colift.control.reference.descent")
 """Modules with kernels that any flight may call."""
 STUDIES = (
-    "colift.study.bench.timing", "colift.study.latency", "colift.study.rehearsal", "colift.study.safety",
+    "colift.study.bench.timing", "colift.study.latency", "colift.study.rehearsal", "colift.study.safety", "colift.plan.planner",
 )  # fmt: skip
 """Modules with kernels that no flight calls, but a study."""
 LONGEST = (("allocation", "safe"), ("supervision", "lift"))
