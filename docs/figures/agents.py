@@ -16,7 +16,6 @@ import numpy as np
 from pages import fill, stored, table
 
 import colift
-from colift.control.agents.base import Status
 from colift.control.agents.exchange_admm import ExchangeAdmm
 from colift.control.agents.leaderless import Leaderless
 from colift.control.allocation.safe import Safe
@@ -49,6 +48,8 @@ FIRST = 20_000
 DRONE_STEPS = 10_000_000
 PLANNED = {2: 30.0, 4: 30.0, 8: 30.0, 16: 24.0}
 """Least angle of the allocator, degrees; agents keep 5 less."""
+AT_ONCE = "agents, settling 0"
+"""Whose allocators answer with the optimum itself, not with a step towards it."""
 LOSSES = (0.0, 0.2, 0.4, 0.6)
 DELAYS = ((0.0, 0.0), (0.0, 0.02), (0.01, 0.02), (0.02, 0.03))
 
@@ -82,26 +83,27 @@ def wanted(rng: np.random.Generator, n: int, size: float, rocking: bool) -> Aske
 
 
 def numbers(out: Array, asked: Asked) -> dict[str, float]:
-    """Force error, N, and smallest angle, degrees, after the beginning; share of cycles in which something was in the way."""
+    """Force error, N, after the beginning, and smallest angle, degrees."""
     error = force_error(asked, out)[BEGIN:]
-    clipped = (out[BEGIN:, :, STATUS].astype(int) & int(Status.CLIPPED)) != 0
     return {
         "rms": float(np.sqrt(np.mean(error**2))),
         "max": float(error.max()),
         "angle": float(np.degrees(least_angles(out[:, :, PULL + 1 : STATUS]).min())),
-        "clipped": float(clipped.mean()),
     }
 
 
 def rehearsed(
     n: int, seed: int, size: float, rocking: bool, radio: dict[str, Any]
 ) -> dict[str, dict[str, float]]:
-    """The same wishes over the same kind of radio, without a leader and with one allocator for all."""
+    """The same wishes over the same kind of radio, without a leader, in three ways, and with one allocator for all."""
     asked = wanted(np.random.default_rng([seed, n]), n, size, rocking)
     team, start = team_of(n), formation_of(n, PLANNED[n] + 4.0)
-    plan = Safe(min_angle_deg=PLANNED[n])
+    plan, at_once = (Safe(min_angle_deg=PLANNED[n], settling=s) for s in (Safe().settling, 0.0))
     agent = Leaderless(min_angle_deg=PLANNED[n] - 5.0)
-    flown = Rehearsal(agent, Radio(**radio), team, start, allocation=plan, key=seed)
+    flown, settled = (
+        Rehearsal(agent, Radio(**radio), team, start, allocation=allocation, key=seed)
+        for allocation in (plan, at_once)
+    )
     link = Link(
         **{
             name: min(value, 0.999)
@@ -113,6 +115,7 @@ def rehearsed(
     return {
         "exchange": numbers(exchange.run(asked), asked),
         "agents": numbers(flown.run(asked), asked),
+        AT_ONCE: numbers(settled.run(asked), asked),
         "central": numbers(commanded(link, team, start, asked, allocation=plan, key=seed), asked),
     }
 
@@ -139,9 +142,9 @@ def curve(
     for name, (size, rocking, radio) in cases.items():
         found = {n: [rehearsed(n, seed, size, rocking, radio) for seed in seeds] for n in sizes}
         for kind in (
-            ("agents", "exchange")
+            ("agents", AT_ONCE, "exchange")
             if {*radio} & {"burst", "split"}
-            else ("agents", "central", "exchange")
+            else ("agents", AT_ONCE, "central", "exchange")
         ):
             cells = []
             for n in sizes:
@@ -163,7 +166,7 @@ def attacked() -> list[list[str]]:
     for n in sizes:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
-            judged = hostility.attacks((n,), -(-DRONE_STEPS // len(sizes)), first_seed=FIRST)
+            judged = hostility.attacks(n, -(-DRONE_STEPS // len(sizes)), FIRST)
         lines.append(
             [
                 str(n), f"{sum(j.drone_steps for j in judged):,}", f"{judged[0].wanted_deg:g}°",

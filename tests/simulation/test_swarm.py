@@ -137,8 +137,7 @@ def test_who_speaks_and_does_not_pull_is_left_out():
     ground = Ground()
     ground.run(300)
     assert ground.missing < 0.01
-    ground.run(1, idle=1)
-    ground.run(40, idle=1)
+    ground.run(15, idle=1)
     assert not any(ground.inside(i, 1) for i in (0, 2, 3))
     ground.run(60, idle=1)
     assert ground.missing < 0.05
@@ -148,7 +147,7 @@ def test_who_speaks_and_does_not_pull_is_left_out():
 def test_who_lies_about_its_pull_is_left_out_and_nobody_else():
     ground = Ground()
     ground.run(300)
-    ground.run(40, lies=1)
+    ground.run(15, lies=1)
     assert not any(ground.inside(i, 1) for i in (0, 2, 3))
     ground.run(200, lies=1)
     assert not any(ground.inside(i, 1) for i in (0, 2, 3))
@@ -169,9 +168,36 @@ def test_what_a_swarm_cannot_fly_is_refused():
     for settings, field in (
         ({}, "agents.kind"),
         ({**SETTINGS, "load_control.kind": "balance"}, "load_control.kind"),
+        ({**SETTINGS, "events": [{"at": 2.0, "field": "drones.join", "value": 3}]}, "drones.join"),
     ):
         with pytest.raises(ColiftError, match=field):
             world.Swarm(load_mission(NAME, settings), NAME, settings)
+
+
+def test_what_a_mission_has_and_the_world_of_a_swarm_has_not_is_told():
+    assert "left out: disturbance" in world.for_agents("real-world", {})[1]
+    assert not any("left out" in note for note in world.for_agents(NAME, {})[1])
+
+
+def test_a_force_that_is_not_whole_again_has_not_settled():
+    flown = world.Flown(0.01)
+    for row in range(400):
+        flown.pulls.append(
+            np.array([[0.0, 0.0, 1.0 if not 100 <= row < 130 and row < 250 else 0.0]])
+        )
+        flown.wished.append(np.array([0.0, 0.0, 1.0]))
+    assert flown.settled(1.0, world.WHOLE, 1.0) is None  # it is missing again after 2.5 s
+    assert flown.settled(0.4, world.WHOLE, 1.0) == pytest.approx(0.9)
+    assert flown.settled(2.5, world.WHOLE, 1.0) is None
+    assert flown.settled(5.0, world.WHOLE, 1.0) is None
+
+
+def test_a_force_that_nobody_bears_is_missing():
+    team = swarm()
+    flown = team.run(1.0, [world.Stroke(0.5, i) for i in range(4)], waits=True)
+    weight = team.mission.team.load_mass * team.mission.team.gravity
+    assert flown.missing[-1] == pytest.approx(weight, rel=0.2)
+    assert flown.settled(0.5, world.WHOLE, weight) is None
 
 
 def test_a_page_says_who_hears_whom():
@@ -202,4 +228,5 @@ def test_the_command_flies_kills_and_says_what_came_of_it():
     assert found["killed"][0]["drone"] == 2
     assert found["killed"][0]["settled"] <= PATIENCE + ALLOWED
     assert "there is no drone 7" in colift("swarm", "--kill", "7@2").stderr
+    assert "ends at 3 s" in colift("swarm", "--seconds", "3", "--kill", "1@3").stderr
     assert "DRONE@TIME" in colift("swarm", "--restart", "7").stderr

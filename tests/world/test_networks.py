@@ -12,14 +12,14 @@ TEAM = Team.uniform(3)
 DT = 0.01
 
 
-def carried(radio: Radio, cycles: int, key: int = 3):
+def carried(radio: Radio, cycles: int, key: int = 3, dt: float = DT):
     """Whether each message was heard, (cycles, 3, 3), and in which cycle it was said."""
     memory = radio.memory(TEAM)
     outboxes = np.zeros((3, 30), np.uint8)
     heard, said = np.zeros((cycles, 3, 3)), np.zeros((cycles, 3, 3), int)
     for cycle in range(cycles):
         writes, _ = radio.call(
-            TEAM, memory, step=cycle, dt=DT, key=key, outboxes=outboxes, members=[0.0, 1.0, 2.0]
+            TEAM, memory, step=cycle, dt=dt, key=key, outboxes=outboxes, members=[0.0, 1.0, 2.0]
         )
         heard[cycle] = writes.heard
         said[cycle] = writes.inboxes[:, :, 0] + 256 * writes.inboxes[:, :, 1].astype(int)
@@ -53,6 +53,16 @@ def test_messages_take_as_long_as_they_may_and_overtake_each_other():
     late = when - said[heard > 0.0]
     assert {*late.tolist()} == {3, 4, 5}  # more than 20 ms, at most 50
     assert (np.diff(said[heard[:, 0, 1] > 0.0, 0, 1]) < 0).any()
+
+
+def test_cycles_shorter_than_a_millisecond_hear_a_message_each_millisecond_as_late_as_it_may_be():
+    heard, said = carried(Radio(delay=0.02, jitter=0.003, loss=0.0), 2000, dt=0.00025)
+    when, _, _ = np.nonzero(heard)
+    late = when - said[heard > 0.0]
+    assert late.min() == 81  # more than 20 ms, at most 23
+    assert late.max() == 92
+    assert (said[heard > 0.0] % 4 == 0).all()
+    assert 0.2 < heard[100:, 0, 1].mean() <= 0.25
 
 
 def test_those_that_are_cut_off_hear_each_other_only():

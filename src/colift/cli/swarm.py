@@ -80,6 +80,10 @@ def swarm(
                 raise typer.BadParameter(
                     f"there is no drone {stroke.drone}; the team has {loaded.team.n}"
                 )
+            if stroke.at >= seconds:
+                raise typer.BadParameter(
+                    f"{stroke.drone}@{stroke.at:g}: the flight ends at {seconds:g} s (--seconds)"
+                )
         team = world.Swarm(loaded, mission, overrides, loss=loss)
     show_notes(notes)
     flown = _fly(team, seconds, strokes, waits=waits, page=page, lines=not as_json)
@@ -101,6 +105,8 @@ def _fly(
 
         shown = HearingPage()
         console(stderr=True).print(f"Who hears whom: {shown.address}", highlight=False)
+    if lines:
+        console(stderr=True).print(f"Starting {team.n} agents", highlight=False)
     try:
         watch = _Watch(shown, lines=lines and console(stderr=True).is_terminal)
         return team.run(seconds, strokes, waits=waits, watch=watch)
@@ -114,10 +120,13 @@ def _tell(result: dict[str, Any]) -> None:
     out = console()
     out.print(f"Load within {100 * result['tracking_max_m']:.1f} cm of its reference.")
     for each in result["killed"]:
-        out.print(
-            f"Drone {each['drone']} killed at {each['at']:g} s: for good within 5 % of the weight after {1e3 * each['settled']:.0f} ms.",
-            highlight=False,
+        settled = each["settled"]
+        found = (
+            "two seconds later the force still misses more than 5 % of the weight."
+            if settled is None
+            else f"within 5 % of the weight after {1e3 * settled:.0f} ms."
         )
+        out.print(f"Drone {each['drone']} killed at {each['at']:g} s: {found}", highlight=False)
 
 
 def _strokes(given: list[str] | None, option: str, *, again: bool = False) -> list[Stroke]:

@@ -1,1 +1,1 @@
-"""Many flights, or many calls of an allocator, and what they tell."""
+"""Many flights, or many calls of an allocator or of agents, and what they tell."""

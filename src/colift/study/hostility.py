@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,6 @@ from colift.control.agents.leaderless import Leaderless
 from colift.control.allocation.safe import Safe
 from colift.study.rehearsal import (
     DT,
-    INNER,
     PULL,
     RESTARTS,
     RUNS,
@@ -52,8 +50,8 @@ class Judged:
     ----------
     n, seed : int
     drone_steps : int
-    inner_deg, world_deg : float
-        Least angle between two cables in the planned frame, and in the world, degrees.
+    world_deg : float
+        Least angle between two cables in the world, degrees.
     wanted_deg : float
         What is promised in the world.
     unfinished : int
@@ -68,7 +66,6 @@ class Judged:
     n: int
     seed: int
     drone_steps: int
-    inner_deg: float
     world_deg: float
     wanted_deg: float
     unfinished: int
@@ -114,7 +111,7 @@ def attack(
         clock_errors=skews, allocation=Safe(min_angle_deg=LEAST[n] + ROOM),
     )  # fmt: skip
     weight = team.load_mass * team.gravity
-    inner = world = math.inf
+    world = math.inf
     sane, unfinished, error = True, 0, 0.0
     last = np.full(n, -PAUSE)
     for begin in range(0, cycles, SLICE):
@@ -122,7 +119,6 @@ def attack(
             rng, n, weight, begin, min(SLICE, cycles - begin), skews, seed % 2 == 0, last
         )
         out = flown.run(asked)
-        inner = min(inner, float(least_angles(out[:, :, INNER:]).min()))
         world = min(world, float(least_angles(out[:, :, PULL + 1 : STATUS]).min()))
         sane = sane and _sane(out)
         ends = np.flatnonzero(calm[:-1] & ~calm[1:])
@@ -130,9 +126,7 @@ def attack(
             unfinished += int((out[ends, :, STATUS].astype(int) & 1).sum())
             error = max(error, float(force_error(asked, out)[ends].max()) / weight)
     steps = n * cycles
-    return Judged(
-        n, seed, steps, math.degrees(inner), math.degrees(world), LEAST[n], unfinished, error, sane
-    )
+    return Judged(n, seed, steps, math.degrees(world), LEAST[n], unfinished, error, sane)
 
 
 def _sane(out: Array) -> bool:
@@ -188,19 +182,7 @@ def _asked(
     return Asked(wishes, steady, plans, events), calm
 
 
-def attacks(
-    sizes: tuple[int, ...],
-    drone_steps: int,
-    first_seed: int = 1000,
-    progress: Callable[[float], None] | None = None,
-    cycles: int = 20_000,
-) -> list[Judged]:
-    """So many drone-steps, the same number for each size of the team."""
-    found: list[Judged] = []
-    each = drone_steps / len(sizes)
-    for place, n in enumerate(sizes):
-        for run in range(math.ceil(each / (n * cycles))):
-            found.append(attack(n, first_seed + run, cycles))
-            if progress is not None:
-                progress((place + min((run + 1) * n * cycles / each, 1.0)) / len(sizes))
-    return found
+def attacks(n: int, drone_steps: int, first_seed: int, cycles: int = 20_000) -> list[Judged]:
+    """So many drone-steps or a few more, a seed for each rehearsal of so many ``cycles``."""
+    runs = math.ceil(drone_steps / (n * cycles))
+    return [attack(n, first_seed + run, cycles) for run in range(runs)]

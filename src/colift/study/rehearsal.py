@@ -34,9 +34,9 @@ Table = named_tuple(
     "Table", ("force", "reference", "received_tensions", "received_directions"), __name__
 )
 _allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
-A, SESSION = MEMORY.at.a, MEMORY.at.session
-PULL, STATUS, INNER, WIDTH = 0, 4, 5, 8
-"""Of a drone's row of the outcome: tension and direction, status, direction in its planned frame (of ``leaderless`` only)."""
+SESSION = MEMORY.at.session
+PULL, STATUS, WIDTH = 0, 4, 5
+"""Of a drone's row of the outcome: tension and direction, status."""
 
 
 @kernel(
@@ -71,8 +71,6 @@ def _rehearse(first, dt, network, agent, allocation, bus, wishes, steady, plans,
             out[row, i, STATUS] = bus.agent_status[i]
             for k in range(3):
                 out[row, i, PULL + 1 + k] = bus.desired_directions[i, k]
-                if width >= A + 3:
-                    out[row, i, INNER + k] = agent.memory[width * i + A + k]
 
 
 @kernel(
@@ -153,6 +151,7 @@ class Rehearsal:
             memory = np.tile(part.memory(team), team.n if name == "allocation" else 1)
             wire = PORTS[name].wire(type(part).kernel, part.params(team), memory, found, key=key)
             self._wires.append(wire.compiled())
+        # Compiled wires hold addresses only.
         self._kernels = [type(part).kernel for part, _ in parts.values()]
         self._desk = Desk(*(signals[name] for name in agents.SIGNALS))
 
@@ -163,7 +162,7 @@ class Rehearsal:
         return found
 
     def run(self, asked: Asked) -> Array:
-        """What each drone decides in each cycle, (rows, n, 8); see :data:`PULL`."""
+        """What each drone decides in each cycle, (rows, n, 5); see :data:`PULL`."""
         out = np.zeros((len(asked.wishes), self.team.n, WIDTH))
         network, agent, allocation = self._wires
         _rehearse(self.cycle, DT, network, agent, allocation, self._desk, *asked, out)

@@ -49,12 +49,6 @@ def put16(message, at, number):  # type: ignore[no-untyped-def]
 
 
 @inline
-def rounded(number):  # type: ignore[no-untyped-def]
-    """The nearest whole number that 16 bits with sign can hold."""
-    return math.floor(min(max(number, -32767.0), 32767.0) + 0.5)
-
-
-@inline
 def count_near(low, own):  # type: ignore[no-untyped-def]
     """The count with these low 16 bits that is nearest to a drone's own."""
     return own + ((low - own + _HALF) & 0xFFFF) - _HALF

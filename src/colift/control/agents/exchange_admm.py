@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from colift.control.agents._message import MOST
 from colift.control.agents.base import SIGNATURE, AgentPart, Status
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
@@ -14,7 +15,6 @@ from colift.kernel.math import message
 from colift.part import Vector
 from colift.team import Team
 
-MOST = 16
 PARAMS = Layout(team={"rho": 1, "unit": 1})
 MEMORY = Layout(drone={"started": 1, "x": 3, "home": 3, "u": 3, "heard": 4 * MOST})
 """Own pull ``x``, the one that it would like best, the price ``u`` of what does not balance; of each other drone whether it was

@@ -18,6 +18,7 @@ from colift.control.agents._pairs import FIRST, LEAST, OFFERED, SETTLED, WIDTH, 
 from colift.control.agents.base import SIGNATURE, AgentPart, Status
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
+from colift.kernel.math import message as numbers
 from colift.part import Setup, Vector
 from colift.team import Team
 from colift.team.geometry import pairwise_angles
@@ -81,7 +82,7 @@ def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def
     memory[M.a], memory[M.a + 1], memory[M.a + 2] = x, y, z
     for k in range(3):
         memory[M.wish + k] = memory[M.steady + k] = 0.0
-    _take(memory, M.steady, sees.steady_wish, 32767.0 * params[P.wish_unit])
+    _take(memory, M.steady, sees.steady_wish, numbers.MOST * params[P.wish_unit])
     pull = max(writes.tension[0], 0.0)
     if now.step == 0 and z < -0.1:
         pull = -memory[M.steady + 2] / (n * z)
@@ -125,10 +126,8 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
             if memory[o + Q.inside] != 0.0:
                 pairs.stand(memory, o, M.a)
         for k in range(3):
-            wish = message.get16(text, message.WISH + 2 * k)
-            share = message.get16(text, message.SHARE + 2 * k)
-            memory[o + Q.wish + k] = wish_unit * (wish - 65536 * (wish >> 15))
-            memory[o + Q.share + k] = share_unit * (share - 65536 * (share >> 15))
+            memory[o + Q.wish + k] = wish_unit * numbers.get(text, message.WISH + 2 * k)
+            memory[o + Q.share + k] = share_unit * numbers.get(text, message.SHARE + 2 * k)
         if memory[o + Q.inside] == 0.0:
             continue
         for half in range(2):
@@ -141,11 +140,8 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _view(sees, memory, me, n, late, started):  # type: ignore[no-untyped-def]
-    """Who is in the team: silence alone lets nobody out. Returns how many, with this drone."""
-    count = 1
-    for j in range(MOST):
-        count += int(memory[M.peers + WIDTH * j + Q.inside])
+def _view(sees, memory, me, n, count, late, started):  # type: ignore[no-untyped-def]
+    """Who is in the team, of ``count`` until now: silence alone lets nobody out. Returns how many, with this drone."""
     for j in range(MOST):
         o = M.peers + WIDTH * j
         there = False
@@ -294,11 +290,11 @@ def _speak(now, sees, params, memory, writes, holding):  # type: ignore[no-untyp
         team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
     message.put16(text, message.TEAM, team)
     for k in range(3):
-        wish = message.rounded(memory[M.steady + k] / wish_unit)
-        share = message.rounded(memory[M.flown + k] / share_unit)
-        memory[M.said + k], memory[M.said + 3 + k] = wish_unit * wish, share_unit * share
-        message.put16(text, message.WISH + 2 * k, wish & 0xFFFF)
-        message.put16(text, message.SHARE + 2 * k, share & 0xFFFF)
+        wish, share = message.WISH + 2 * k, message.SHARE + 2 * k
+        numbers.put(text, wish, memory[M.steady + k] / wish_unit)
+        numbers.put(text, share, memory[M.flown + k] / share_unit)
+        memory[M.said + k] = wish_unit * numbers.get(text, wish)
+        memory[M.said + 3 + k] = share_unit * numbers.get(text, share)
     for half in range(2):
         at = message.PAIRS + message.PAIR * half
         j = _next_peer(memory, int(memory[M.turn]))
@@ -366,8 +362,8 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     most = params[P.rate] * dt
     plan = sees.reference
     frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], most)
-    _take(memory, M.wish, sees.wish, 32767.0 * params[P.wish_unit])
-    _take(memory, M.steady, sees.steady_wish, 32767.0 * params[P.wish_unit])
+    _take(memory, M.wish, sees.wish, numbers.MOST * params[P.wish_unit])
+    _take(memory, M.steady, sees.steady_wish, numbers.MOST * params[P.wish_unit])
 
     _listen(now, sees, params, memory, me, n)
     late = params[P.patience] / dt
@@ -376,7 +372,7 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         team += int(memory[M.peers + WIDTH * j + Q.inside])
     x, y, z = frame.to_frame(memory, M.up, sees.felt[0], sees.felt[1], sees.felt[2])
     evidence.weigh(memory, M.peers, M.lack, (x, y, z), M.pull, team, late, dt)
-    team = _view(sees, memory, me, n, late, started)
+    team = _view(sees, memory, me, n, team, late, started)
 
     holding = others = False
     for k in range(3):
@@ -525,6 +521,6 @@ class Leaderless(AgentPart):
         return PARAMS.pack(
             team.n, g=team.gravity, least=math.sin(0.5 * keep), cone=math.cos(math.radians(self.max_cone_deg)), rate=self.max_rate,
             settling=self.settling, patience=self.patience, stale=self.stale, period=self.period,
-            wish_unit=WISHES * weight / 32767.0, share_unit=SHARES * weight / 32767.0, key=(int(self.key[8:], 16), int(self.key[:8], 16)),
+            wish_unit=WISHES * weight / numbers.MOST, share_unit=SHARES * weight / numbers.MOST, key=(int(self.key[8:], 16), int(self.key[:8], 16)),
             low=self.settled("tension_min", team), high=self.settled("tension_max", team),
         )  # fmt: skip

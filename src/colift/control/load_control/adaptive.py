@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from colift.control.load_control._upright import keep_upright
-from colift.control.load_control.base import SIGNATURE, LoadControlPart
+from colift.control.load_control.base import DRAWN, SIGNATURE, LoadControlPart
 from colift.control.margins import Hanging
 from colift.control.tuning import LEAN, Delays
 from colift.kernel.jit import kernel
@@ -26,8 +26,6 @@ PARAMS = Layout(
 MEMORY = Layout(team={"mass": 1, "lean": 2})
 """Learned over told mass, less 1, so that zero is the start; force against a steady horizontal one."""
 P, M = PARAMS.at, MEMORY.at
-DRAWN = 0.05
-"""Time in which what is learned is drawn to what a team without a leader has agreed on, s."""
 
 
 @kernel(SIGNATURE)

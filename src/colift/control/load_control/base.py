@@ -14,6 +14,8 @@ SIGNATURE = PORTS["load_control"].signature
 
 Called at the layer's own period, ``now.dt``.
 """
+DRAWN = 0.05
+"""Time in which what a controller has learned is drawn to ``sees.agreed_force`` of a team without a leader, s."""
 
 
 class LoadControlPart(Part):

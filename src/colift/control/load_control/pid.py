@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from colift.control.load_control.base import SIGNATURE, LoadControlPart
+from colift.control.load_control.base import DRAWN, SIGNATURE, LoadControlPart
 from colift.control.margins import Hanging
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
@@ -23,8 +23,6 @@ PARAMS = Layout(
 )  # fmt: skip
 MEMORY = Layout(team={"integral": 3})
 P, M = PARAMS.at, MEMORY.at
-DRAWN = 0.05
-"""Time in which the integral is drawn to what a team without a leader has agreed on, s."""
 
 
 @kernel(SIGNATURE, counted=False)

@@ -70,8 +70,10 @@ class Flown:
         Cycle, s.
     load, wanted : list of (3,)
         Where the load was and was to be, m.
-    pulls, wishes : list of (n, 3)
-        What each drone did to the load and wanted all to do, N; wishes are not numbers for those that did not answer.
+    pulls : list of (n, 3)
+        What each drone did to the load, N.
+    wished : list of (3,)
+        What those that answered wanted all to do, on average, N; where nobody did, what was wanted last.
     hears : list of (n,)
         Whom each heard, a bit for each number; 0 for those that did not answer.
     status : list of (n,)
@@ -83,23 +85,22 @@ class Flown:
     load: list[Array] = field(default_factory=list)
     wanted: list[Array] = field(default_factory=list)
     pulls: list[Array] = field(default_factory=list)
-    wishes: list[Array] = field(default_factory=list)
+    wished: list[Array] = field(default_factory=list)
     hears: list[list[int]] = field(default_factory=list)
     status: list[list[int]] = field(default_factory=list)
 
     @property
     def missing(self) -> Array:
         """By how much the sum of pulls misses the mean wish, (rows,), N."""
-        wish = np.nanmean(np.array(self.wishes), axis=1)
-        return np.asarray(np.linalg.norm(np.array(self.pulls).sum(axis=1) - wish, axis=1))
+        pulls = np.array(self.pulls).sum(axis=1)
+        return np.asarray(np.linalg.norm(pulls - np.array(self.wished), axis=1))
 
     def missing_now(self) -> float:
         """The last of it."""
-        wish = np.nanmean(self.wishes[-1], axis=0)
-        return float(np.linalg.norm(self.pulls[-1].sum(axis=0) - wish))
+        return float(np.linalg.norm(self.pulls[-1].sum(axis=0) - self.wished[-1]))
 
     def summary(self, strokes: Sequence[Stroke], weight: float) -> dict[str, Any]:
-        """Distance from the path, m, and for each agent that was killed the time until the force was whole again, s."""
+        """Distance from the path, m, and for each agent that was killed the time until the force was whole again, s; none where it never was."""
         away = np.linalg.norm(np.array(self.load) - np.array(self.wanted), axis=1)
         killed = [
             {
@@ -116,15 +117,21 @@ class Flown:
             "killed": killed,
         }
 
-    def settled(self, at: float, share: float, weight: float) -> float:
-        """Time from ``at`` (s) until so much of the weight is missing no more, for the next two seconds, s."""
+    def settled(self, at: float, share: float, weight: float) -> float | None:
+        """Time from ``at`` (s) until so much of the weight is missing no more in the two seconds from there, s; none where it still is."""
         first = round(at / self.dt)
-        late = np.flatnonzero(self.missing[first : first + round(2.0 / self.dt)] > share * weight)
+        missing = self.missing[first : first + round(2.0 / self.dt)] > share * weight
+        if missing.size == 0 or missing[-1]:
+            return None
+        late = np.flatnonzero(missing)
         return float((late[-1] + 1) * self.dt) if late.size else 0.0
 
 
 def for_agents(name: str, overrides: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """What else a mission needs to be flown by a swarm, and a note on each: agents, a law of the load's place, a cycle of 10 ms."""
+    """What else a mission needs to be flown by a swarm: agents, a law of the load's place, a cycle of 10 ms.
+
+    With a note on each, and on what of the mission this world does not have.
+    """
     mission = load_mission(name, overrides)
     found: dict[str, Any] = {}
     if mission.kinds["agents"] != "leaderless":
@@ -134,7 +141,11 @@ def for_agents(name: str, overrides: dict[str, Any]) -> tuple[dict[str, Any], li
     if mission.kinds["load_control"] != "pid":
         mass = mission.team.load_mass
         found |= {"load_control": {"kind": "pid", **{k: [g * mass] * 3 for k, g in GAINS.items()}}}
-    return {**overrides, **found}, [f"{field} = {value}" for field, value in found.items()]
+    notes = [f"{field} = {value}" for field, value in found.items()]
+    left = [name for name in ("events", "disturbance", "fault") if getattr(mission, name)]
+    if left:
+        notes.append(f"left out: {', '.join(left)}")
+    return {**overrides, **found}, notes
 
 
 class Swarm:
@@ -149,6 +160,8 @@ class Swarm:
             raise ColiftError(
                 'load_control.kind: a swarm needs "pid", which brings the load to its place by itself'
             )
+        if len(mission.first_drones()) < mission.team.n:
+            raise ColiftError("drones.join: a swarm flies all its drones from the start")
         self.mission, self.n, self.loss = mission, mission.team.n, loss
         self.dt = mission.timing.allocation
         self._source = name, overrides
@@ -166,6 +179,7 @@ class Swarm:
         self.load[0] = mission.reference.sample(np.zeros(1), team)[0, 0]
         self._bias = BIAS * self._rng.standard_normal((self.n, 3)) / np.sqrt(3.0)
         self._last: list[Command | None] = [None] * self.n
+        self._wished = weight
         self._directions, self._tensions = directions.copy(), tensions.copy()
 
     def _bound(self) -> socket.socket:
@@ -304,15 +318,17 @@ class Swarm:
     def _fly(self, cycle: int) -> None:
         team, n = self.mission.team, self.n
         mass = self.mission.true_bodies.load_mass
-        wished, hears, status = np.full((n, 3), np.nan), [0] * n, [-1] * n
-        wanted = np.zeros((n, 3))
+        hears, status, wanted = [0] * n, [-1] * n, np.zeros((n, 3))
+        answers = [last for last in self._last if last is not None and last.cycle == cycle]
+        if answers:
+            self._wished = np.mean([answer.wish for answer in answers], axis=0)
+        for answer in answers:
+            hears[answer.number], status[answer.number] = answer.hears, answer.status
         for drone, last in enumerate(self._last):
             if last is None or (cycle - last.cycle) * self.dt > WATCHDOG:
                 continue
             self._directions[drone] = last.direction
             wanted[drone] = -last.tension * np.array(last.direction)
-            if last.cycle == cycle:
-                wished[drone], hears[drone], status[drone] = last.wish, last.hears, last.status
         h = self.dt / SUBSTEPS
         for _ in range(SUBSTEPS):
             self.pulls += h / (h + LAG) * (wanted - self.pulls)
@@ -322,6 +338,6 @@ class Swarm:
         flown.load.append(self.load[0].copy())
         flown.wanted.append(self.mission.reference.sample(np.array([cycle * self.dt]), team)[0, 0])
         flown.pulls.append(self.pulls.copy())
-        flown.wishes.append(wished)
+        flown.wished.append(self._wished)
         flown.hears.append(hears)
         flown.status.append(status)

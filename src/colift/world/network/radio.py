@@ -33,7 +33,7 @@ MEMORY = Layout(drone={"said": None})
 P, S, M = PARAMS.at, SLOT.at, MEMORY.at
 _WIDTH = SLOT.size(0)
 SHORTEST = 1e-3
-"""Shortest cycle for which all that is on its way is kept, s."""
+"""Least time between two messages of a drone that are carried, s: so many are kept as may be on their way."""
 _PAIRS, _BLOCKS, _BEGINS = 1 << 12, 1 << 25, 1 << 26
 """Channels of random numbers: one for each pair of drones, of messages, of blocks and of where blocks begin."""
 
@@ -43,9 +43,10 @@ def _carry(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     n, dt = sees.members.shape[0], now.dt
     slots, row = int(params[P.slots]), int(params[P.row])
     delay, jitter, burst = params[P.delay], params[P.jitter], params[P.burst]
-    if now.step > 0:
+    every = max(1, math.ceil(SHORTEST / dt - 1e-9))
+    if now.step > 0 and (now.step - 1) % every == 0:
         for j in range(n):
-            o = row * j + M.said + _WIDTH * ((now.step - 1) % slots)
+            o = row * j + M.said + _WIDTH * ((now.step - 1) // every % slots)
             memory[o + S.sent] = now.step
             for k in range(MESSAGE):
                 memory[o + S.bytes + k] = sees.outboxes[j, k]
@@ -55,7 +56,7 @@ def _carry(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     apart = 0.0 <= time < params[P.split_for]
     sides = int(params[P.split])
     first = max(1, math.ceil(delay / dt - 1e-9))
-    last = min(max(1, math.ceil((delay + jitter) / dt - 1e-9)), slots - 1)
+    last = max(1, math.ceil((delay + jitter) / dt - 1e-9))
     for i in range(n):
         own = int(sees.members[i])
         for j in range(n):
@@ -66,8 +67,10 @@ def _carry(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             channel = _PAIRS * own + other
             for late in range(first, last + 1):
                 sent = now.step - late + 1
-                o = row * j + M.said + _WIDTH * ((sent - 1) % slots)
-                if sent < 1 or memory[o + S.sent] != sent:
+                if sent < 1 or (sent - 1) % every != 0:
+                    continue
+                o = row * j + M.said + _WIDTH * ((sent - 1) // every % slots)
+                if memory[o + S.sent] != sent:
                     continue
                 way, luck = noise.uniforms(now.key, sent, channel)
                 if late != max(1, math.ceil((delay + jitter * way) / dt - 1e-9)):
@@ -86,7 +89,8 @@ def _carry(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 class Radio(NetworkPart):
     """A message takes ``delay`` and up to ``jitter`` more, evenly distributed, and at least a cycle; it may overtake another.
 
-    Each drone loses messages of each other by itself. Cycles (``timing.allocation``) are of 1 ms at least.
+    Each drone loses messages of each other by itself. Where cycles (``timing.allocation``) are shorter than 1 ms, a message is carried
+    every millisecond.
     """
 
     kernel = _carry
