@@ -20,7 +20,7 @@ import colift
 from colift.deploy.c.header import header_of
 from colift.deploy.c.kernels import Kernel
 from colift.deploy.c.layers import LAYERS
-from colift.deploy.c.types import NOTHING
+from colift.deploy.c.vectors import fields_of
 from colift.flight.flight import Flight
 from colift.part import kind_of
 
@@ -44,13 +44,13 @@ class Compiled:
         self.function = getattr(ctypes.CDLL(str(folder / f"{name}.so")), name)
         self.kinds = self.kernel.sees, self.kernel.writes
         self.structs = [
-            type("Struct", (ctypes.Structure,), {"_fields_": [("n", ctypes.c_int), *((f, ctypes.c_void_p) for f in _fields(kind))]})
+            type("Struct", (ctypes.Structure,), {"_fields_": [("n", ctypes.c_int), *((f, ctypes.c_void_p) for f in fields_of(kind))]})
             for kind in self.kinds
         ]  # fmt: skip
 
     def __call__(self, n: int, now: Any, sees: Any, params: Any, memory: Any, writes: Any) -> int:
         structs = [
-            made(n, *(getattr(given, f).ctypes.data for f in _fields(kind)))
+            made(n, *(getattr(given, f).ctypes.data for f in fields_of(kind)))
             for made, kind, given in zip(self.structs, self.kinds, (sees, writes), strict=True)
         ]
         vectors = {"params": params, "memory": memory}
@@ -60,10 +60,6 @@ class Compiled:
         return int(
             self.function(told, ctypes.byref(structs[0]), *places, ctypes.byref(structs[1]), *lengths)
         )  # fmt: skip
-
-
-def _fields(kind: Any) -> list[str]:
-    return [f for f, each in zip(kind.made._fields, kind.each, strict=True) if each != NOTHING]
 
 
 def same(a: Any, b: Any) -> bool:

@@ -63,6 +63,16 @@ def test_single_precision_holds_the_load_with_the_same_thrusts(tmp_path):
     assert thrusts[1] == pytest.approx(thrusts[0], rel=1e-3)
 
 
+def test_an_export_replaces_another_one(tmp_path):
+    safe = ["noisy-spiral", "--set", "allocation.kind=safe", "--part"]
+    for wanted in (("--part", "allocation,attitude_control"), (*safe, "allocation", "--float32")):
+        made = _export(tmp_path, *wanted)
+        assert made.returncode == 0, made.stderr
+        command = ["make", "-C", str(tmp_path), "CFLAGS=-O2 -Werror", "all", "check"]
+        built = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert built.returncode == 0, built.stdout + built.stderr
+
+
 def test_a_part_in_plain_python_is_refused_and_nothing_is_written(tmp_path):
     made = _export(tmp_path / "out", "--set", "allocation.kind=slsqp", "--part", "allocation")
     assert made.returncode != 0

@@ -84,6 +84,10 @@ def _helper(text: str, folder: Path):
         ("if n > 0:\n        return x\n    return a", "different kinds"),
         ("a.fill(0.0)\n    return x", "no such"),
         ("y = a if n > 2 else x\n    return x", "now of one kind"),
+        ("return x // 2.0", "for other numbers"),
+        ("if n == 0:\n        x = 1.0\n    elif (x, 2.0, x)[n] > 0.0:\n        x = 2.0\n    return x", "a variable of its own"),
+        ("return x if n > 2 or (x, 2.0, x)[n] > 0.0 else 2.0", "a variable of its own"),
+        ("return g(x)\n\nfrom colift.kernel.jit import inline\n\n@inline\ndef g(x, n=1):\n    return x", "other arguments"),
     ],
 )  # fmt: skip
 def test_what_c_does_otherwise_is_refused_with_file_and_line(body, why, tmp_path):
@@ -113,6 +117,16 @@ def test_order_that_c_leaves_open_is_refused(tmp_path):
 
 
 @compiler
+def test_what_c_counts_with_hides_no_variable(tmp_path):
+    text = "k = n - 1\n    b = a[:k]\n    b[:] = 0.0\n    return a[k]"
+    program = Program()
+    made = program.translation(_helper(f"def f(a, n):\n    {text}\n", tmp_path), (Array(), INT))
+    (tmp_path / "none.h").touch()
+    (tmp_path / "f.c").write_text(program.file([made], "none.h"))
+    subprocess.run(["gcc", *FLAGS, "-Wshadow", "-c", "f.c"], cwd=tmp_path, check=True)
+
+
+@compiler
 @pytest.mark.parametrize(
     ("body", "arguments"),
     [
@@ -126,6 +140,9 @@ def test_order_that_c_leaves_open_is_refused(tmp_path):
         ("return 1.0 if 0 < n <= 3 else -(-x)", [(0.5, n) for n in range(5)]),
         ("for k in range(n):\n        if k == 3:\n            break\n    else:\n        return 1.0\n    return 2.0", [(0.0, 2), (0.0, 9)]),
         ("for k in range(n, 0, -2):\n        n -= 1\n        x = 2.0 * x + k\n    return x + n", [(0.1, 9)]),
+        ("return 1.0 if n in (n | 1, 2) else x", [(0.5, n) for n in range(4)]),
+        ("k_end = 3\n    for k in range(n + k_end):\n        k_end += 1\n        x = 2.0 * x + k_end\n    return x", [(0.1, 2)]),
+        ("a = b = c = d = e = 1\n    for k in range(n):\n        e = d\n        d = c\n        c = b\n        b = a\n        a = x\n    return float(e)", [(0.5, n) for n in range(7)]),
         ("t = (x, 2.0, 3.0)\n    s = 0.0\n    for k in range(3):\n        s = s * x + t[k]\n    return s", [(1.3, 0)]),
     ],
 )  # fmt: skip

@@ -11,6 +11,7 @@ import pytest
 from colift.errors import MissionError, PlanError
 from colift.plan import planner
 from colift.plan.distances import CYLINDER, along, distance
+from colift.plan.problem import assemble
 from colift.plan.scene import Scene, load_scene
 from terminal import colift
 
@@ -76,6 +77,23 @@ def test_a_plan_begins_and_ends_at_rest(found):
     )
 
 
+@pytest.mark.parametrize("far", [0.0, 0.03, 0.12])
+def test_a_short_hop_begins_and_ends_where_the_scene_says(far):
+    scene = replace(window(), goal=np.array([-0.5 + far, 0.0, 0.0]), obstacles=np.zeros((0, 8)))
+    hop = planner.plan(scene, attempts=1)
+    assert "obstacle" not in hop.excess
+    np.testing.assert_allclose(
+        hop.sample(20)["load"][[0, -1], 0], [scene.start, scene.goal], atol=1e-12
+    )
+
+
+def test_what_is_no_number_is_not_certified(found):
+    broken = found.pull_points.copy()
+    broken[10] = np.nan
+    worst = planner.excess(found.scene, found.limits, found.load_points, broken, found.duration)
+    assert np.isinf(worst).all()
+
+
 def test_the_certificate_sees_what_dense_distances_see(found):
     assert max(found.excess.values()) <= 0.0
     moved = found.scene.obstacles.copy()
@@ -111,7 +129,8 @@ def test_gradients_are_those_of_the_cost():
     grad, col = np.zeros(grid.unknowns + 1), np.zeros(grid.unknowns + 1)
 
     def cost(x, z, T, fill=0):
-        return attempt.assemble(x, z, T, grad, col, fill)
+        problem = attempt.problem(planner.MARGINS)
+        return assemble(x, z, T, fill, *problem, grad, col, attempt.worst)
 
     T, h = 1.0, 1e-6
     cost(attempt.x, attempt.z, T, 1)

@@ -58,8 +58,7 @@ def plan(
     out = console()
     out.print(f"{found.name}, {len(found.lengths)} drones: {best.duration:.3f} s", highlight=False)
     for kind, value in best.excess.items():
-        if value > -1e6:
-            out.print(f"  {kind:>10}  {-value:.4g} to its limit", highlight=False)
+        out.print(f"  {kind:>10}  {-value:.4g} to its limit", highlight=False)
     if best.moved_deg > 0.5:
         out.print(
             f"  the start's cables were turned by up to {best.moved_deg:.1f} degrees: they could not rest",

@@ -79,12 +79,11 @@ def path(
     count: int,
 ) -> Numbers:
     """Places (count, 3) of the load, equally far apart, on a cheap way round the obstacles; ``noise`` makes ways differ."""
-    cell = 0.15
     low, high = (
         np.minimum(start, goal) - [0.6, 0.9, 0.6],
         np.maximum(start, goal) + np.array([0.6, 0.9, 0.75]),
     )
-    cell = max(cell, float((high - low).max()) / 60.0)
+    cell = max(0.15, float((high - low).max()) / 60.0)
     shape = np.ceil((high - low) / cell).astype(int) + 1
     cost = np.ones(tuple(shape))
     if noise > 0.0:
@@ -97,14 +96,13 @@ def path(
     at = np.round((goal - low) / cell).astype(np.int64)
     _sweep(cost, go, at, cell)
     here = np.round((start - low) / cell).astype(int)
-    places = [start]
-    while go[tuple(here)] > 0.0 and len(places) < 500:
+    between: list[Numbers] = []
+    while go[tuple(here)] > 0.0 and len(between) < 500:
         box = tuple(slice(max(h - 1, 0), h + 2) for h in here)
         near = go[box]
         here = np.array(np.unravel_index(near.argmin(), near.shape)) + np.maximum(here - 1, 0)
-        places.append(low + cell * here)
-    places[-1] = goal
-    line = np.array(places)
+        between.append(low + cell * here)
+    line = np.array([start, *between[:-1], goal])
     far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     at_equal = np.linspace(0.0, far[-1], count)
     line = np.stack([np.interp(at_equal, far, line[:, c]) for c in range(3)], axis=1)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from colift.errors import PlanError
 from colift.plan import guess, splines
-from colift.plan.problem import KINDS, LIMITS, assemble, optimise
+from colift.plan.problem import KINDS, LIMITS, NEVER, assemble, optimise, sampled
 from colift.plan.scene import Scene
 from colift.record.recording import atomic_path
 
@@ -82,26 +82,30 @@ def basis(n: int) -> Numbers:
     return np.ascontiguousarray(Q[:, 1:])
 
 
+def tables(intervals: int, samples: int) -> tuple[Numbers, Numbers]:
+    """Those of load and pulls, with all derivatives that a plan needs."""
+    load, pulls = (splines.table(intervals, degree, degree, samples) for degree in DEGREES)
+    return load, pulls
+
+
 class Grid:
     """Tables and places in the unknowns of a spline with so many intervals, for n drones."""
 
     def __init__(self, n: int, intervals: int, samples: int = SAMPLES) -> None:
         self.n, self.intervals, self.samples = n, intervals, samples
-        self.load = splines.table(intervals, 7, 7, samples)
-        self.pulls = splines.table(intervals, 5, 5, samples)
-        counts = [intervals + degree for degree in DEGREES]
+        self.load, self.pulls = tables(intervals, samples)
+        counts, widths = [intervals + degree for degree in DEGREES], (3, 3 * (n - 1))
         keys = [
-            (p - (degree / 2), 1 - which, which, p)
+            (p - degree / 2, which, p)
             for which, (degree, fixed, count) in enumerate(zip(DEGREES, FIXED, counts, strict=True))
             for p in range(fixed, count - fixed)
         ]
         self.index = [np.full(count, -1, dtype=np.int64) for count in counts]
         at = 0
-        for _, _, which, p in sorted(keys, key=lambda key: (key[0], key[2])):
+        for _, which, p in sorted(keys):
             self.index[which][p] = at
-            at += 3 if which == 0 else 3 * (n - 1)
+            at += widths[which]
         self.unknowns = at
-        widths = (3, 3 * (n - 1))
         self.spans = np.zeros((intervals, 2), dtype=np.int64)
         for j in range(intervals):
             used = [
@@ -111,7 +115,6 @@ class Grid:
                 if o >= 0
             ]
             self.spans[j] = min(a for a, _ in used), max(b for _, b in used)
-        self.band = int(np.diff(self.spans, axis=1).max())
         self.H, self.work = np.zeros((at, at)), np.zeros((at, at))
 
 
@@ -120,7 +123,7 @@ class Plan:
     """A whole-team trajectory; ``load_points`` (K + 7, 3) and ``pull_points`` (K + 5, 3 n - 3) over ``duration``, s.
 
     ``excess`` says by how much it is beyond each limit at its worst dense sample (:data:`colift.plan.problem.KINDS`; m, m, weights,
-    rad/s, equal shares, m/s): below 0 everywhere for one that was accepted.
+    rad/s, equal shares, m/s): below 0 everywhere for one that was accepted, and nothing of obstacles where there are none.
     """
 
     scene: Scene
@@ -149,43 +152,22 @@ class Plan:
         """
         each = max(-(-count // self.intervals), 1)
         n, K, g = len(self.scene.lengths), self.intervals, self.limits.gravity
-        x = np.stack([
-            splines.curve(self.load_points, splines.table(K, 7, 7, each)[:, k], K, each) / self.duration**k for k in range(7)
-        ], axis=1)  # fmt: skip
-        z = np.stack([
-            splines.curve(self.pull_points, splines.table(K, 5, 5, each)[:, k], K, each) / self.duration**k for k in range(5)
-        ], axis=1)  # fmt: skip
-        twice = np.array([2.0, 6.0, 12.0, 20.0, 30.0])
-        F = x[:, 2:] * twice[None, :, None] / g
-        F[:, 0, 2] += 1.0
-        zl = z.reshape(len(z), 5, n - 1, 3)
-        f = F[:, :, None] / n + np.einsum("il,sklc->skic", basis(n), zl)
-        u = _unit(f)
-        drones = x[:, :3, None] + self.scene.lengths[None, None, :, None] * u[:, :3]
-        to = np.array([1.0, 1.0, 2.0])[None, :, None, None]
-        forces = f[:, :3] * to * self.limits.load_mass * g
-        drones = drones * to
-        thrusts = self.limits.drone_mass * (drones[:, 2] + [0.0, 0.0, g]) + forces[:, 0]
-        factorials = np.array([1.0, 1.0, 2.0, 6.0, 24.0])[None, :, None]
+        S = each * K + 1
+        x, f, u = np.empty((S, 7, 3)), np.empty((S, n, 5, 3)), np.empty((S, n, 5, 3))
+        U = np.empty((S, n, 3, 3))
+        sampled(
+            self.load_points, self.pull_points, self.duration, *tables(K, each), basis(n), self.scene.lengths,
+            self.limits.numbers(), x, f, u, U,
+        )  # fmt: skip
+        factorials = np.array([1.0, 1.0, 2.0, 6.0, 24.0])[:, None]
+        drones = x[:, None, :3] + self.scene.lengths[:, None, None] * u[:, :, :3]
         return {
-            "time": np.linspace(0.0, self.duration, len(x)),
+            "time": np.linspace(0.0, self.duration, S),
             "load": x[:, :5] * factorials,
-            "forces": np.ascontiguousarray(np.swapaxes(forces, 1, 2)),
-            "drones": np.ascontiguousarray(np.swapaxes(drones, 1, 2)),
-            "thrusts": thrusts,
+            "forces": f[:, :, :3] * factorials[:3] * self.limits.load_mass * g,
+            "drones": drones * factorials[:3],
+            "thrusts": self.limits.drone_mass * g * U[:, :, 0],
         }
-
-
-def _unit(f: Numbers) -> Numbers:
-    """Taylor coefficients of f / |f| along axis 1 of (S, order, n, 3)."""
-    order = f.shape[1]
-    y = [sum((f[:, i] * f[:, k - i]).sum(-1) for i in range(k + 1)) for k in range(order)]
-    r = [y[0] ** -0.5]
-    for k in range(1, order):
-        r.append(sum((-0.5 * j - (k - j)) * y[j] * r[k - j] for j in range(1, k + 1)) / (k * y[0]))
-    return np.stack(
-        [sum(f[:, j] * r[k - j][..., None] for j in range(k + 1)) for k in range(order)], axis=1
-    )
 
 
 class Attempt:
@@ -215,16 +197,10 @@ class Attempt:
         n = len(self.scene.lengths)
         z = np.einsum("il,sic->slc", self.N, along.reshape(S, n, 3)).reshape(S, -1)
         self.x, self.z = (
-            self._fit(values, local, degree, fixed)
-            for values, local, degree, fixed in (
-                (at, grid.load[:, 0], *self._ends(0)), (z, grid.pulls[:, 0], *self._ends(1)),
-            )
+            self._fit(values, local[:, 0], degree, fixed)
+            for values, local, degree, fixed in zip((at, z), (grid.load, grid.pulls), DEGREES, FIXED, strict=True)
         )  # fmt: skip
         self.T[0] = duration
-
-    @staticmethod
-    def _ends(which: int) -> tuple[int, int]:
-        return DEGREES[which], FIXED[which]
 
     def _fit(self, values: Numbers, local: Numbers, degree: int, fixed: int) -> Numbers:
         matrix = splines.dense(local, self.grid.intervals, self.grid.samples)
@@ -239,28 +215,25 @@ class Attempt:
 
     def refine(self, grid: Grid) -> None:
         """The same curves on twice the knots."""
-        self.x = splines.refined(self.x, 7, self.grid.intervals)
-        self.z = splines.refined(self.z, 5, self.grid.intervals)
+        self.x, self.z = (
+            splines.refined(points, degree, self.grid.intervals)
+            for points, degree in zip((self.x, self.z), DEGREES, strict=True)
+        )
         self.grid, self.obstacles = grid, self.scene.obstacles
-        for points, fixed in ((self.x, 6), (self.z, 4)):
+        for points, fixed in zip((self.x, self.z), FIXED, strict=True):
             points[:fixed], points[-fixed:] = points[0], points[-1]
 
-    def improve(self, hurry: float, most: int, margins: Numbers) -> int:
+    def problem(self, margins: Numbers) -> Any:
+        """What the kernels are told beside control points and duration (:data:`colift.plan.problem.PROBLEM`)."""
         grid = self.grid
-        return int(optimise(
-            self.x, self.z, self.T, hurry, grid.load, grid.pulls, grid.samples, self.N, self.scene.lengths, self.params,
-            self.obstacles, margins, grid.index[0], grid.index[1], grid.spans, grid.band, grid.H, grid.work, most, 1e-9, self.worst,
-        ))  # fmt: skip
+        return (
+            grid.load, grid.pulls, self.N, self.scene.lengths, self.params, self.obstacles, margins, *grid.index, grid.spans, grid.H,
+        )  # fmt: skip
 
-    def assemble(
-        self, x: Numbers, z: Numbers, T: float, grad: Numbers, col: Numbers, fill: int
-    ) -> float:
-        """The cost of control points, and with ``fill`` its gradient; for tests."""
-        grid = self.grid
-        return float(assemble(
-            x, z, T, grid.load, grid.pulls, grid.samples, self.N, self.scene.lengths, self.params, self.scene.obstacles, MARGINS,
-            grid.index[0], grid.index[1], grid.spans, grid.H, grad, col, fill, self.worst,
-        ))  # fmt: skip
+    def improve(self, hurry: float, most: int, margins: Numbers) -> None:
+        """Optimise on the grid, in so many iterations at most; time weighs ``hurry``, and stays where that is 0."""
+        problem = (*self.problem(margins), self.worst)
+        optimise(self.x, self.z, self.T, hurry, most, self.grid.work, *problem)
 
     def copy(self) -> Found:
         return self.x.copy(), self.z.copy(), float(self.T[0])
@@ -277,13 +250,12 @@ def excess(
     """By how much splines are beyond each limit at their worst sample, both ends among them."""
     K = len(load) - DEGREES[0]
     worst, none = np.zeros(len(KINDS)), np.zeros(0)
-    index = [np.full(len(points), -1, dtype=np.int64) for points in (load, pulls)]
-    assemble(
-        load, pulls, duration, splines.table(K, 7, 7, samples), splines.table(K, 5, 5, samples), samples, basis(len(scene.lengths)),
-        scene.lengths, limits.numbers(), scene.obstacles, np.zeros(5), index[0], index[1], np.zeros((K, 2), dtype=np.int64), np.zeros((0, 0)), none,
-        none, 0, worst,
+    ix, iz = (np.full(len(points), -1, dtype=np.int64) for points in (load, pulls))
+    cost = assemble(
+        load, pulls, duration, 0, *tables(K, samples), basis(len(scene.lengths)), scene.lengths, limits.numbers(), scene.obstacles,
+        np.zeros(5), ix, iz, np.zeros((K, 2), dtype=np.int64), np.zeros((0, 0)), none, none, worst,
     )  # fmt: skip
-    return np.where(np.isfinite(worst), worst, np.inf)
+    return worst if np.isfinite(cost) else np.full_like(worst, np.inf)
 
 
 def rest(scene: Scene, limits: Limits) -> tuple[Numbers, float]:
@@ -350,18 +322,8 @@ def plan(
         if found is not None:
             first = first or now
             x, z, T = found
-            best = Plan(
-                scene,
-                limits,
-                T,
-                x,
-                z,
-                dict(zip(KINDS, worst.tolist(), strict=True)),
-                seed,
-                k,
-                moved,
-                first,
-            )
+            told = {kind: float(e) for kind, e in zip(KINDS, worst, strict=True) if e > NEVER}
+            best = Plan(scene, limits, T, x, z, told, seed, k, moved, first)
         elif near is None or worst.max() < near.max():
             near = worst
         progress((k + 1) / attempts)
@@ -395,15 +357,26 @@ def first_guess(attempt: Attempt, grid: Grid, rng: np.random.Generator, k: int) 
     """Path of the load and pulls along it: straightforward at first, then by chance."""
     scene, n = attempt.scene, len(attempt.scene.lengths)
     room = (0.25, 0.4, 0.55)[k % 3]
+    limits = attempt.limits
     places = guess.path(
-        scene.start, scene.goal, scene.obstacles, 0.1, room, rng, 0.0 if k == 0 else 0.8, 41
+        scene.start,
+        scene.goal,
+        scene.obstacles,
+        limits.radius,
+        room,
+        rng,
+        0.0 if k == 0 else 0.8,
+        41,
     )
     pulls = np.repeat(attempt.rest.reshape(1, -1), len(places), axis=0)
     if k > 0:
         shift = rng.normal(0.0, 0.05 / n, (n, 3))
         pulls[1:-1] += (shift - shift.mean(axis=0)).ravel()
     attempt.obstacles = guess.one_sided(places, scene.obstacles)
-    guess.yield_to(places, pulls, scene.lengths, attempt.obstacles, 0.11, 0.205, 0.4, 0.02, 40)
+    guess.yield_to(
+        places, pulls, scene.lengths, attempt.obstacles, limits.radius + 0.01, 2.05 * limits.radius,
+        limits.slack + 0.1, 0.02, 40,
+    )  # fmt: skip
     far = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
     attempt.begin(places, pulls, grid, (2.3, 2.8, 2.0)[k % 3] * np.sqrt(max(far, 0.3)))
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from colift.kernel.jit import aside, f8, i8, inline, kernel, matrix, tensor, vector
+from colift.kernel.jit import aside, f8, i8, inline, kernel, matrix, tensor, vector, void
 from colift.kernel.layout import Layout
 from colift.plan.distances import along, distance
 from colift.plan.flatness import back, direction, thrust
@@ -27,12 +27,24 @@ drones' centres; radii of drones, load and cables, m; weight of smoothness."""
 P = LIMITS.at
 UNITS = (20.0, 10.0, 1.0, 10.0, 3.0)
 """Weights of a metre, of a weight of thrust, of a rad/s, of an equal share of pull, of a m/s."""
+ENOUGH = 1e-9
+"""Cost that is none."""
+NEVER = -1e9
+"""Excess over a limit that nothing was held to."""
 KINDS = ("obstacle", "separation", "thrust", "rate", "tension", "speed")
 
 
 @inline
-def _spread(s, first, T, n, xbar, fbar, used, x, z, BX, BZ, N, g, lo, ix, iz, local, zbar):  # type: ignore[no-untyped-def]
-    """Gradient of one number by the unknowns of an interval, into ``local``, from those by the series; returns that by T."""
+def _add(r, s, first, T, series, tables, bars, into):  # type: ignore[no-untyped-def]
+    """One residual into the normal equations, by its gradient with respect to the series (``bars``), which is cleared.
+
+    The last of ``grad`` and ``col`` are T's.
+    """
+    x, z = series
+    BX, BZ, N, g = tables
+    xbar, fbar, used, zbar = bars
+    ix, iz, lo, hi, local, H, grad, col = into
+    n = N.shape[0]
     for k in range(5):
         for c in range(3):
             total = 0.0
@@ -74,12 +86,6 @@ def _spread(s, first, T, n, xbar, fbar, used, x, z, BX, BZ, N, g, lo, ix, iz, lo
                     for k in range(5):
                         total += BZ[s, k, a] * zbar[k, c]
                     local[o - lo + 3 * m + c] += total
-    return by_T
-
-
-@inline
-def _add(r, by_T, lo, hi, local, H, grad, col):  # type: ignore[no-untyped-def]
-    """One residual into the normal equations; clears its gradient. The last of ``grad`` and ``col`` are T's."""
     for a in range(hi - lo):
         v = local[a]
         if v != 0.0:
@@ -92,6 +98,11 @@ def _add(r, by_T, lo, hi, local, H, grad, col):  # type: ignore[no-untyped-def]
     last = grad.shape[0] - 1
     grad[last] += r * by_T
     col[last] += by_T * by_T
+    xbar[:] = 0.0
+    for i in range(n):
+        if used[i]:
+            fbar[i] = 0.0
+            used[i] = False
 
 
 @inline
@@ -140,65 +151,48 @@ def states(s, first, T, cx, cz, BX, BZ, N, L, params, x, z, f, u, A, size, U, b,
 
 
 @aside
-def _point(r, gx, gy, gz, share, i, L, A, xbar, fbar, ubar):  # type: ignore[no-untyped-def]
-    """Gradients of a number that changes by ``g`` with the place ``share`` of the way along cable i."""
+def _point(gx, gy, gz, reach, i, A, bars):  # type: ignore[no-untyped-def]
+    """Gradient of a number that changes by ``g`` with the place ``reach`` along cable i; that of the load for i < 0."""
+    xbar, fbar, used, _ = bars
     gs = (gx, gy, gz)
     for c in range(3):
         xbar[0, c] += gs[c]
     if i >= 0:
+        used[i] = True
         for c in range(3):
-            v = share * L * gs[c]
+            v = reach * gs[c]
             for a in range(3):
                 fbar[i, 0, a] += A[i, 0, a, c] * v
 
 
-ASSEMBLE = f8(
-    matrix,
-    matrix,
-    f8,
-    tensor,
-    tensor,
-    i8,
-    matrix,
-    vector,
-    vector,
-    matrix,
-    vector,
-    i8[::1],
-    i8[::1],
-    i8[:, ::1],
-    matrix,
-    vector,
-    vector,
-    i8,
-    vector,
-)
+_each = f8[:, :, :, ::1]
 
 
-@kernel(ASSEMBLE)
+@kernel(void(matrix, matrix, f8, tensor, tensor, matrix, vector, vector, tensor, _each, _each, _each))  # fmt: skip
+def sampled(cx, cz, T, BX, BZ, N, L, params, x, f, u, U):  # type: ignore[no-untyped-def]
+    """The series at all samples: load (S, 7, 3), pulls and directions (S, n, 5, 3), thrusts (S, n, 3, 3)."""
+    S, n, K = BX.shape[0], N.shape[0], cx.shape[0] + 1 - BX.shape[2]
+    samples = (S - 1) // K
+    z, A = np.zeros((max(n - 1, 1), 5, 3)), np.zeros((n, 5, 3, 3))
+    b, B, size, weight = np.zeros((n, 3, 3)), np.zeros((n, 3, 3, 3)), np.zeros(n), np.zeros(n)
+    for s in range(S):
+        first = min(s // samples, K - 1)
+        states(
+            s, first, T, cx, cz, BX, BZ, N, L, params, x[s], z, f[s], u[s], A, size, U[s], b, B, weight
+        )  # fmt: skip
+
+
+PROBLEM = (tensor, tensor, matrix, vector, vector, matrix, vector, i8[::1], i8[::1], i8[:, ::1], matrix)  # fmt: skip
+"""Tables of load and pulls, basis, lengths, limits, obstacles, margins; places of control points in the unknowns, of each interval's, and H."""
+
+
+@kernel(f8(matrix, matrix, f8, i8, *PROBLEM, vector, vector, vector))
 def assemble(  # type: ignore[no-untyped-def]
-    cx,
-    cz,
-    T,
-    BX,
-    BZ,
-    samples,
-    N,
-    L,
-    params,
-    obstacles,
-    margins,
-    ix,
-    iz,
-    spans,
-    H,
-    grad,
-    col,
-    fill,
-    worst,
-):
+    cx, cz, T, fill, BX, BZ, N, L, params, obstacles, margins, ix, iz, spans, H, grad, col, worst
+):  # fmt: skip
     """Half the sum of the squared residuals; with ``fill`` also normal equations. ``worst`` gets the largest excess of each kind."""
     n, S, K = N.shape[0], BX.shape[0], spans.shape[0]
+    samples = (S - 1) // K
     g = params[P.g]
     x, z = np.zeros((7, 3)), np.zeros((max(n - 1, 1), 5, 3))
     f, u, A = np.zeros((n, 5, 3)), np.zeros((n, 5, 3)), np.zeros((n, 5, 3, 3))
@@ -208,16 +202,17 @@ def assemble(  # type: ignore[no-untyped-def]
     Ubar, bbar, zbar = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((5, 3))
     used = np.zeros(n, dtype=np.bool_)
     local = np.zeros(H.shape[0])
+    series, tables, bars = (x, z), (BX, BZ, N, g), (xbar, fbar, used, zbar)
     cost = 0.0
     for k in range(worst.shape[0]):
-        worst[k] = -1e9
+        worst[k] = NEVER
     if fill:
         H[:] = 0.0
         grad[:] = 0.0
         col[:] = 0.0
     for s in range(S):
         first = min(s // samples, K - 1)
-        lo, hi = spans[first, 0], spans[first, 1]
+        into = ix, iz, spans[first, 0], spans[first, 1], local, H, grad, col
         states(s, first, T, cx, cz, BX, BZ, N, L, params, x, z, f, u, A, size, U, b, B, weight)
         v = math.sqrt(x[1, 0] ** 2 + x[1, 1] ** 2 + x[1, 2] ** 2 + 1e-12)
         excess = v - params[P.speed]
@@ -228,11 +223,7 @@ def assemble(  # type: ignore[no-untyped-def]
             if fill:
                 for c in range(3):
                     xbar[1, c] = w * x[1, c] / v
-                by_T = _spread(
-                    s, first, T, n, xbar, fbar, used, x, z, BX, BZ, N, g, lo, ix, iz, local, zbar
-                )
-                _add(w * excess, by_T, lo, hi, local, H, grad, col)
-                xbar[:] = 0.0
+                _add(w * excess, s, first, T, series, tables, bars, into)
         # Obstacles: load, drones, cables.
         for o in range(obstacles.shape[0]):
             for i in range(-1, 2 * n):
@@ -241,8 +232,6 @@ def assemble(  # type: ignore[no-untyped-def]
                     t, need = 0.0, params[P.load_radius]
                 elif i < n:
                     t, need = 1.0, params[P.radius]
-                    for c in range(3):
-                        place[i, c] = x[0, c] + L[i] * u[i, 0, c]
                 else:
                     length = L[drone]
                     need = params[P.cable_radius]
@@ -274,34 +263,8 @@ def assemble(  # type: ignore[no-untyped-def]
                 w = UNITS[0]
                 cost += 0.5 * (w * excess) ** 2
                 if fill:
-                    _point(0.0, -w * gx, -w * gy, -w * gz, t, drone, L[k], A, xbar, fbar, ubar)
-                    if drone >= 0:
-                        used[drone] = True
-                    by_T = _spread(
-                        s,
-                        first,
-                        T,
-                        n,
-                        xbar,
-                        fbar,
-                        used,
-                        x,
-                        z,
-                        BX,
-                        BZ,
-                        N,
-                        g,
-                        lo,
-                        ix,
-                        iz,
-                        local,
-                        zbar,
-                    )
-                    _add(w * excess, by_T, lo, hi, local, H, grad, col)
-                    xbar[:] = 0.0
-                    if drone >= 0:
-                        used[drone] = False
-                        fbar[drone] = 0.0
+                    _point(-w * gx, -w * gy, -w * gz, reach, drone, A, bars)
+                    _add(w * excess, s, first, T, series, tables, bars, into)
         # Between drones.
         for i in range(n):
             for c in range(3):
@@ -321,50 +284,9 @@ def assemble(  # type: ignore[no-untyped-def]
                 w = UNITS[0]
                 cost += 0.5 * (w * excess) ** 2
                 if fill:
-                    _point(
-                        0.0,
-                        -w * dx / d,
-                        -w * dy / d,
-                        -w * dz / d,
-                        1.0,
-                        i,
-                        L[i],
-                        A,
-                        xbar,
-                        fbar,
-                        ubar,
-                    )
-                    _point(
-                        0.0, w * dx / d, w * dy / d, w * dz / d, 1.0, j, L[j], A, xbar, fbar, ubar
-                    )
-                    used[i] = True
-                    used[j] = True
-                    by_T = _spread(
-                        s,
-                        first,
-                        T,
-                        n,
-                        xbar,
-                        fbar,
-                        used,
-                        x,
-                        z,
-                        BX,
-                        BZ,
-                        N,
-                        g,
-                        lo,
-                        ix,
-                        iz,
-                        local,
-                        zbar,
-                    )
-                    _add(w * excess, by_T, lo, hi, local, H, grad, col)
-                    xbar[:] = 0.0
-                    used[i] = False
-                    used[j] = False
-                    fbar[i] = 0.0
-                    fbar[j] = 0.0
+                    _point(-w * dx / d, -w * dy / d, -w * dz / d, L[i], i, A, bars)
+                    _point(w * dx / d, w * dy / d, w * dz / d, L[j], j, A, bars)
+                    _add(w * excess, s, first, T, series, tables, bars, into)
         # Each drone: motors (most, least), body rate, cable's rate, pull.
         for i in range(n):
             dot = 2.0 * (
@@ -424,13 +346,7 @@ def assemble(  # type: ignore[no-untyped-def]
                             fbar[i, k, c] += params[P.q] * Ubar[k, c]
                 back(A[i], 5, ubar, fbar[i])
                 used[i] = True
-                by_T = _spread(
-                    s, first, T, n, xbar, fbar, used, x, z, BX, BZ, N, g, lo, ix, iz, local, zbar
-                )
-                _add(r, by_T, lo, hi, local, H, grad, col)
-                used[i] = False
-                xbar[:] = 0.0
-                fbar[i] = 0.0
+                _add(r, s, first, T, series, tables, bars, into)
                 ubar[:] = 0.0
                 Ubar[:] = 0.0
                 bbar[:] = 0.0
@@ -485,89 +401,28 @@ def _solve(H, mu, band, grad, col, work, d, e):  # type: ignore[no-untyped-def]
         d[k], e[k] = a / pivot, c / pivot
 
 
-OPTIMISE = i8(
-    matrix,
-    matrix,
-    vector,
-    f8,
-    tensor,
-    tensor,
-    i8,
-    matrix,
-    vector,
-    vector,
-    matrix,
-    vector,
-    i8[::1],
-    i8[::1],
-    i8[:, ::1],
-    i8,
-    matrix,
-    matrix,
-    i8,
-    f8,
-    vector,
-)
-
-
-@kernel(OPTIMISE)
+@kernel(i8(matrix, matrix, vector, f8, i8, matrix, *PROBLEM, vector))
 def optimise(  # type: ignore[no-untyped-def]
-    cx,
-    cz,
-    T,
-    hurry,
-    BX,
-    BZ,
-    samples,
-    N,
-    L,
-    params,
-    obstacles,
-    margins,
-    ix,
-    iz,
-    spans,
-    band,
-    H,
-    work,
-    most,
-    enough,
-    worst,
-):
+    cx, cz, T, hurry, most, work, BX, BZ, N, L, params, obstacles, margins, ix, iz, spans, H, worst
+):  # fmt: skip
     """Levenberg and Marquardt from these control points, which are replaced; T (1,) is free where ``hurry``, its weight, is not 0.
 
-    Ends where the cost is ``enough``, no longer falls, or after ``most`` iterations; returns how many.
+    Ends where there is no cost, where it no longer falls, or after ``most`` iterations; returns how many.
     """
     M = H.shape[0]
     grad, col = np.zeros(M + 1), np.zeros(M + 1)
     d, e = np.zeros(M), np.zeros(M)
     newx, newz = cx.copy(), cz.copy()
+    problem = (BX, BZ, N, L, params, obstacles, margins, ix, iz, spans, H, grad, col, worst)
+    band = 0
+    for k in range(spans.shape[0]):
+        band = max(band, spans[k, 1] - spans[k, 0])
     mu = 1e-3
     stalls = 0
-    cost = assemble(
-        cx,
-        cz,
-        T[0],
-        BX,
-        BZ,
-        samples,
-        N,
-        L,
-        params,
-        obstacles,
-        margins,
-        ix,
-        iz,
-        spans,
-        H,
-        grad,
-        col,
-        1,
-        worst,
-    )
+    cost = assemble(cx, cz, T[0], 1, *problem)
     cost += 0.5 * (hurry * T[0]) ** 2
     for iteration in range(most):
-        if hurry == 0.0 and cost < enough:
+        if hurry == 0.0 and cost < ENOUGH:
             return iteration
         _solve(H, mu, band, grad, col, work, d, e)
         step = 0.0
@@ -581,7 +436,6 @@ def optimise(  # type: ignore[no-untyped-def]
                 bottom -= col[k] * e[k]
             step = -top / max(bottom, 1e-9)
             step = min(max(step, -0.15 * T[0]), 0.15 * T[0])
-        newT = T[0] + step
         largest = 0.0
         for k in range(M):
             largest = max(largest, abs(d[k] - step * e[k]))
@@ -597,27 +451,7 @@ def optimise(  # type: ignore[no-untyped-def]
                 newz[p, c] = cz[p, c] + (
                     shrink * (d[iz[p] + c] - step * e[iz[p] + c]) if iz[p] >= 0 else 0.0
                 )
-        new = assemble(
-            newx,
-            newz,
-            newT,
-            BX,
-            BZ,
-            samples,
-            N,
-            L,
-            params,
-            obstacles,
-            margins,
-            ix,
-            iz,
-            spans,
-            H,
-            grad,
-            col,
-            0,
-            worst,
-        )
+        new = assemble(newx, newz, newT, 0, *problem)
         new += 0.5 * (hurry * newT) ** 2
         if new < cost:
             stalls = stalls + 1 if cost - new < 1e-4 * cost else 0
@@ -628,27 +462,7 @@ def optimise(  # type: ignore[no-untyped-def]
             mu = max(0.3 * mu, 1e-9)
             if stalls >= 3:
                 return iteration
-            assemble(
-                cx,
-                cz,
-                T[0],
-                BX,
-                BZ,
-                samples,
-                N,
-                L,
-                params,
-                obstacles,
-                margins,
-                ix,
-                iz,
-                spans,
-                H,
-                grad,
-                col,
-                1,
-                worst,
-            )
+            assemble(cx, cz, T[0], 1, *problem)
         else:
             mu *= 5.0
             if mu > 1e6:

@@ -27,7 +27,7 @@ class Scene:
     start, goal : (3,) arrays
         Of the load, at rest.
     directions : (n, 3) array
-        Unit vectors from the load to the drones at both ends; None: a cone.
+        Unit vectors from the load to the drones at both ends, those of the file's start; None: a cone.
     lengths : (n,) array
         Of the cables.
     obstacles : (m, 8) array

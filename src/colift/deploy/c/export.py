@@ -124,6 +124,8 @@ def files_of(
         if not single:  # in which a memory goes its own way
             table, tests["cascade"] = cascade.test()
     files["test_vectors.h"], files["test.c"] = vectors.data() + table, vectors.program(tests)
+    sources = (name for name in files if name.startswith("colift_") and name.endswith(".c"))
+    marks["KERNELS"] = " ".join(sorted(name.replace(".c", ".o") for name in sources))
     for name in ("Makefile", "README.md", "LICENSE", *(["example.c"] if allocator else [])):
         files[name] = template(name, marks)
     return files

@@ -124,6 +124,12 @@ class Expressions:
         """Write a line of the body."""
         self.lines.append("    " * self._indent + line)
 
+    def unused(self, name: str) -> str:
+        """A name that the function does not use itself: the one that is asked for, or one like it."""
+        while name in self.outer.names:
+            name += "_"
+        return name
+
     def declaration(self, kind: Type, name: str, *, const: bool = False) -> str:
         """Of a variable."""
         if isinstance(kind, Array):
@@ -176,7 +182,7 @@ class Expressions:
     def kept(self, value: Value, node: ast.AST) -> Value:
         """The same in a variable of its own."""
         self._fresh += 1
-        name = f"kept{self._fresh}"
+        name = self.unused(f"kept{self._fresh}")
         code = self.converted(value, value.type, node)
         self.emit(f"{self.declaration(value.type, name, const=True)} = {code};")
         return Value(name, value.type, known=value.known)
@@ -198,6 +204,14 @@ class Expressions:
             self.refuse(node, "no such expression in C")
         value = found(node)
         assert isinstance(value, Value)
+        return value
+
+    def lazily(self, node: ast.expr) -> Value:
+        """An expression at which Python may never look, so that nothing of it may stand in lines before."""
+        begin = len(self.lines)
+        value = self.value(node)
+        if len(self.lines) > begin:
+            self.refuse(node, "needs a variable of its own, where nobody may look at it")
         return value
 
     def constant(self, node: ast.expr, known: Any) -> Value:
@@ -314,6 +328,8 @@ class Expressions:
         kind = INT if left.type == right.type == INT else REAL
         if isinstance(node.op, ast.Mod | ast.FloorDiv):
             name = "modulo" if isinstance(node.op, ast.Mod) else "whole"
+            if name == "whole" and kind == REAL:
+                self.refuse(node, "this operator is for other numbers")
             helper = self.program.helper(name, kind)
             a, b = (self.converted(each, kind, node) for each in (left, right))
             return Value(f"{helper}({a}, {b})", kind, **flags)
@@ -366,11 +382,11 @@ class Expressions:
         return replace(value, code=f"{value.within(SHIFT)} != {zero}", binds=EQUAL, type=BOOL)
 
     def truth(self, node: ast.expr) -> str:
-        """The code of a condition."""
-        return self.condition(self.value(node), node).code
+        """The code of a condition that may never be looked at."""
+        return self.condition(self.lazily(node), node).code
 
     def _of_BoolOp(self, node: ast.BoolOp) -> Value:
-        values = [self.value(each) for each in node.values]
+        values = [self.value(node.values[0]), *map(self.lazily, node.values[1:])]
         if any(each.type != BOOL for each in values):
             self.refuse(node, "and, or as something else than a condition")
         sign, binds = ("&&", ALL) if isinstance(node.op, ast.And) else ("||", ANY)
@@ -403,13 +419,13 @@ class Expressions:
         if value.acts or among.parts is None:
             self.refuse(node, "only in a tuple that is written out")
         sign, link = ("==", "||") if isinstance(node.ops[0], ast.In) else ("!=", "&&")
-        codes = (self.converted(each, value.type, node) for each in among.parts)
-        code = f" {link} ".join(f"{value.within(SHIFT)} {sign} {each}" for each in codes)
+        parts = [replace(e, code=self.converted(e, value.type, node)) for e in among.parts]
+        code = f" {link} ".join(f"{value.within(SHIFT)} {sign} {e.within(SHIFT)}" for e in parts)
         return Value(code, BOOL, ANY if link == "||" else ALL, reads=value.reads)
 
     def _of_IfExp(self, node: ast.IfExp) -> Value:
         test = self.condition(self.value(node.test), node.test)
-        values = self.value(node.body), self.value(node.orelse)
+        values = self.lazily(node.body), self.lazily(node.orelse)
         kind = joined(values[0].type, values[1].type)
         if kind is None:
             self.refuse(node, "now of one kind, now of another")
@@ -503,7 +519,7 @@ class Expressions:
         if isinstance(found, int):
             return Value(str(found), INT, known=found)
         for name in self.source.parameters:
-            if f"{name}_length" in found and name not in self.lengths:
+            if f"{name}_length" in found.split() and name not in self.lengths:
                 self.lengths.append(name)
         return Value(found, INT, SUM if " " in found else ATOM)
 

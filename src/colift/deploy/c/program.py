@@ -186,8 +186,7 @@ class Program:
             if each not in order:
                 for other in each.calls:
                     visit(other)
-                if each not in order:
-                    order.append(each)
+                order.append(each)
 
         for root in roots:
             visit(root)

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from colift.deploy.c.expressions import ATOM, BINARY, SHIFT, UNKNOWN, Expressions, Value, local
+from colift.deploy.c.expressions import ATOM, BINARY, SHIFT, SUM, UNKNOWN, Expressions, Value, local
 from colift.deploy.c.places import Places
 from colift.deploy.c.source import Source
 from colift.deploy.c.types import (
@@ -31,7 +31,7 @@ from colift.deploy.c.types import (
 if TYPE_CHECKING:
     from colift.deploy.c.program import Program
 
-_PASSES = 5
+_PASSES = 20
 """Most times that a function is looked through until all types are known."""
 
 
@@ -52,6 +52,8 @@ class Translation(Expressions):
         self.result: Type | None = None
         self.written, self.lengths, self.types = set(), [], {}
         self.places = self.outer = Places(self.source)
+        if len(kinds) != len(self.source.parameters):
+            self.refuse(self.source.tree, "called with other arguments than it names")
         self._counting: list[str] = []
         self._whole: list[str] = []
         self.parameters = {
@@ -63,6 +65,8 @@ class Translation(Expressions):
             self._pass(final=False)
             if before == (self.types, self.written, self.result):
                 break
+        else:
+            self.refuse(self.source.tree, "the types of its variables do not settle")
         self._pass(final=True)
 
     def _parameter(self, name: str, kind: Type) -> Value:
@@ -85,7 +89,7 @@ class Translation(Expressions):
                 given.append(self.declaration(kind, name))
             else:
                 given.append(f"{self.program.spelled(kind)} {local(name)}")
-        given += [f"int {local(name)}_length" for name in self.lengths]
+        given += [f"int {name}_length" for name in self.lengths]
         result = self.program.spelled(self.result)
         return f"{result} {self.name}({', '.join(given) or 'void'})"
 
@@ -174,7 +178,7 @@ class Translation(Expressions):
         self.emit(f"return {self.converted(value, merged, node)};")
 
     def _do_If(self, node: ast.If) -> None:
-        self.emit(f"if ({self.truth(node.test)}) {{")
+        self.emit(f"if ({self.condition(self.value(node.test), node.test).code}) {{")
         self._inside(node.body)
         rest = node.orelse
         while len(rest) == 1 and isinstance(rest[0], ast.If):
@@ -192,11 +196,7 @@ class Translation(Expressions):
     def _do_While(self, node: ast.While) -> None:
         if node.orelse:
             self.refuse(node, "a loop with else")
-        begin = len(self.lines)
-        test = self.truth(node.test)
-        if len(self.lines) > begin:
-            self.refuse(node.test, "a condition that needs a variable of its own")
-        self.emit(f"while ({test}) {{")
+        self.emit(f"while ({self.truth(node.test)}) {{")
         self._loop(node.body, "")
 
     def _do_For(self, node: ast.For) -> None:
@@ -219,10 +219,11 @@ class Translation(Expressions):
         start, stop = (self.literal(0, node), given[0]) if len(given) == 1 else given[:2]
         begin, end = f"int {name} = {start.code}", stop.within(SHIFT)
         if self.places.changes(call, node.body) or stop.reads or stop.acts:
-            begin, end = f"{begin}, {name}_end = {stop.code}", f"{name}_end"
+            end = self.unused(f"{name}_end")
+            begin = f"{begin}, {end} = {stop.code}"
         sign, ahead = "<" if step.known > 0 else ">", f"{name} += {step.code}"
         ahead = {1: f"++{name}", -1: f"--{name}"}.get(step.known, ahead)
-        whole = f"whole{node.lineno - self.source.first}" if node.orelse else ""
+        whole = self.unused(f"whole{node.lineno - self.source.first}") if node.orelse else ""
         if whole:
             self.emit(f"bool {whole} = true;")
         self.emit(f"for ({begin}; {name} {sign} {end}; {ahead}) {{")
@@ -320,9 +321,9 @@ class Translation(Expressions):
         if not isinstance(array.type, Array) or array.type.inner or value.known is UNKNOWN:
             self.refuse(node, "no constant for a row of numbers")
         self.write_to(array.type, node)
-        length = self.length(array.type.length, node).code
-        self.emit(f"for (int k = 0; k < {length}; ++k) {{")
-        self.emit(f"    {array.code}[k] = {self.converted(value, REAL, node)};")
+        length, k = self.length(array.type.length, node).within(SUM), self.unused("k")
+        self.emit(f"for (int {k} = 0; {k} < {length}; ++{k}) {{")
+        self.emit(f"    {array.within(ATOM)}[{k}] = {self.converted(value, REAL, node)};")
         self.emit("}")
 
     def _place(self, target: ast.expr, node: ast.AST) -> Value:

@@ -50,7 +50,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Tuple:
-    """Several values; with names where ``made`` is their class, and ``by_place`` where C is told where they stand."""
+    """Several values; with names where ``made`` is their class."""
 
     each: tuple[Type, ...]
     made: Any = None
@@ -90,8 +90,8 @@ def joined(one: Type, other: Type) -> Type | None:
             return replace(one, length=length, roots=one.roots | other.roots)
         if not isinstance(one, Tuple):
             return one
-    if {one, other} == {REAL, INT} if isinstance(one, str) and isinstance(other, str) else False:
-        return REAL
+    if isinstance(one, str) and isinstance(other, str):
+        return REAL if {one, other} == {REAL, INT} else None
     if isinstance(one, Array) and isinstance(other, Array):
         if (one.inner, one.stride) != (other.inner, other.stride):
             return None
