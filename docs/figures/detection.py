@@ -1,6 +1,6 @@
 """Write the tables of docs/world.md on detection: ``python docs/figures/detection.py [--fly]``.
 
-Times to detect, and false alarms, over 40 seeds; then false alarms of ``real-world-adaptive`` in 10 m/s of wind with gusts, over
+Times to detect, and false alarms, over 40 seeds; then false alarms of ``real-world`` in 10 m/s of wind with gusts, over
 340 seeds with each mass of the load. From ``detection.json`` beside this file, which ``--fly`` makes first.
 """
 
@@ -36,11 +36,11 @@ def windy(seed: int, wind: float, fault: dict[str, Any]) -> Flight:
 
 
 def gusty(seed: int, load: float, fault: dict[str, Any] | None = None) -> Flight:
-    """The mission real-world-adaptive with this share of the believed mass of the load: 10 m/s, gusts, rotors that drag."""
+    """The mission real-world with this share of the believed mass of the load: 10 m/s, gusts, rotors that drag."""
     changes: dict[str, Any] = {"seed": seed, "truth.load_mass_factor": load}
     if fault:
         changes |= {"fault": [fault], "timing.duration": fault["at"] + 3.0}
-    flown = Flight(load_mission("real-world-adaptive", changes))
+    flown = Flight(load_mission("real-world", changes))
     flown.run()
     return flown
 

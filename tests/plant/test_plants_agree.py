@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import colift
+from colift.mission import load_mission
 from colift.part import find, names
 
 BOUNDS = {
@@ -70,3 +71,16 @@ def test_mujoco_comes_nearer_to_rigid_cables_as_its_limit_hardens():
         errors.append(differences(flown, flight("rigid-cables", 1.0))[0])
     rates = np.array(errors[:-1]) / errors[1:]
     assert np.all(rates > 2.0), errors
+
+
+def test_mujocos_cables_are_as_stiff_as_the_rope_that_the_team_needs():
+    paper = load_mission("paper-spiral", {"plant.kind": "mujoco"})
+    assert paper.plant.decay(paper.team) == 0.002
+    heavy = load_mission("heavy-lift", {"plant.kind": "mujoco"})
+    elastic = load_mission("heavy-lift", {"plant.kind": "elastic-cables"})
+    (stiffness, *_), team = elastic.plant.tautness(elastic.team), heavy.team
+    mass = team.masses[0] * team.load_mass / (team.masses[0] + team.load_mass)
+    spring = mass / heavy.plant.decay(team) ** 2
+    assert spring == pytest.approx(stiffness / team.cable_lengths[0], rel=1e-12)
+    given = load_mission("heavy-lift", {"plant.kind": "mujoco", "plant.time_constant": 0.003})
+    assert given.plant.decay(team) == 0.003

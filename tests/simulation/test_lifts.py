@@ -136,6 +136,22 @@ def test_smallest_and_largest_drones(name):
     check(fly(name))
 
 
+@pytest.mark.slow
+def test_slow_drones_on_a_stiff_rope_go_on_towards_the_load_until_they_are_level():
+    """Leaning against a cable that is gone they drift outwards for as long as their attitude needs."""
+    heavy = fly(
+        "pick-up-and-place",
+        drones__vehicle="heavy-lift-25kg",
+        drones__cable_length=5.0,
+        load__mass=15.0,
+        plant__kind="elastic-cables",
+        reference__points=[[0.0, 0.0, 2.5], [5.0, 0.0, 3.0]],
+        supervision__set_down=[5.0, 2.5],
+        timing__duration=110.0,
+    )
+    check(heavy, RELEASED, down=1.25)
+
+
 @pytest.mark.parametrize("count", [2, 8])
 def test_few_drones_and_many(count):
     check(fly(drones__count=count, load__mass=0.225 if count < 8 else 0.6))

@@ -34,8 +34,8 @@ EAGER = 2.0
 """Speed with which the drones go on as the tensions vanish, over that of touch-down."""
 BRAKING = 0.08
 """For how long the drones are accelerated towards a load that has touched, s."""
-UNLOADING, VANISH, FADE = 0.6, 0.02, 0.3
-"""Time to unload, time in which the tensions vanish, time constant of the drones' speed then, s."""
+UNLOADING, VANISH = 0.6, 0.02
+"""Time to unload, and time in which the tensions vanish, s."""
 TOUCHED = 0.3
 """Force of the ground over a drone's weight at which its motors stop."""
 SINK = 0.05
@@ -150,7 +150,7 @@ def unload(t, time, dt, params, memory, n):  # type: ignore[no-untyped-def]
         if time < BRAKING and params[P.brake] > 0.0 and memory[o + M.span + 1] < 0.0:
             steady(o, memory)
         else:
-            memory[o + M.want] = -EAGER * params[P.touch] * math.exp(-time / FADE)
+            memory[o + M.want] = -EAGER * params[P.touch] * math.exp(-time / params[P.fade])
     if time >= UNLOADING:
         go(memory, SLACKEN, t)
 

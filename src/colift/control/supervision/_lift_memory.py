@@ -16,7 +16,7 @@ PARAMS = Layout(
         "g": 1, "m_L": 1, "feel": 1, "learn": 1, "delay": 1, "lag": 1, "fly": 1, "rounds": 1,
         "aside": 1, "places": 2 * MOST_ROUNDS, "speed": 1, "touch": 1, "release": 1, "ground": 1,
         "sole": 1, "hook": 1, "climb": 1, "margin": 1, "rise": 1, "stiff": 1, "damp": 1, "clear": 1,
-        "catch": 1, "patience": 1, "brake": 1,
+        "catch": 1, "patience": 1, "brake": 1, "fade": 1,
     },
     drone={"m": 1, "L": 1, "drag": 1},
 )  # fmt: skip
@@ -26,7 +26,8 @@ the load's place above the ground when it stands, m; ``margin``: height
 from which on it goes down at the speed of touch-down, m; time in which the lift share would ``rise`` by 1, s; how a lifted load is held,
 as accelerations of the load by the lift share: per height (``stiff``) and speed (``damp``); height
 above the ground at which the reference begins at least (``clear``), m; speed at which a cable comes taut (``catch``), m/s; time after which
-a phase on the ground that does not end is given up (``patience``), s; acceleration of the drones towards a load that has touched (``brake``), m/s^2."""
+a phase on the ground that does not end is given up (``patience``), s; acceleration of the drones towards a load that has touched (``brake``), m/s^2, and the time constant of their
+speed afterwards (``fade``), s."""
 MEMORY = Layout(
     team={
         "started": 1, "phase": 1, "since": 1, "clock": 1, "place": 3, "ground": 1, "begin": 3,

@@ -61,6 +61,9 @@ BRAKE = 5.0
 GENTLE, BRISK, SLOW = 0.08, 0.12, 0.06
 """Least and most speed of a touch-down, m/s, that is as fast as the drones are thrown up, so that no cable catches them; and that where they
 are thrown up faster and will be caught in any case, at this speed, or where there are one or two, which turn widely as they brake."""
+FADE, LEVELLED = 0.3, 3.0
+"""Least time constant of the drones' speed towards a load that has touched, s, and what it is over the time in which an attitude answers:
+until a drone that leaned against its cable is level, it goes on outwards."""
 RODS = ("rigid-cables",)
 """Plants whose cables cannot be slack."""
 MOVING = 0.02
@@ -214,7 +217,8 @@ class Lift(SupervisionPart, Delays):
             yield "kind", message
 
     def params(self, team: Team) -> Vector:
-        band = self.bandwidths(team).velocity
+        bandwidths = self.bandwidths(team)
+        band = bandwidths.velocity
         L = float(team.cable_lengths.mean())
         pull = team.load_mass * team.gravity / float(team.masses.sum())
         ratio = 1.0 + float(team.masses.sum()) / team.load_mass
@@ -238,6 +242,7 @@ class Lift(SupervisionPart, Delays):
             rise=max(RAISE, SLOWLY / band), stiff=0.1 * band * band * ratio,
             damp=0.5 * band * ratio, margin=0.08 * max(1.0, math.sqrt(L)),
             clear=0.15 * max(1.0, math.sqrt(L)), patience=PATIENCE, brake=0.0 if caught else BRAKE,
+            fade=max(FADE, LEVELLED / bandwidths.attitude),
             catch=min(0.004 * math.sqrt(L) * min(L, 1.0), gentle),
             m=team.masses, L=team.cable_lengths, drag=drag,
         )  # fmt: skip

@@ -322,7 +322,14 @@ def level_arc(
 
 ROPE = 4e4
 """EA of braided Dyneema of 1 mm, N: about."""
+CARRIED = 0.225
+"""Load that a rope of 1 mm is taken for, kg: the paper's. Held by one such rope, it stretches it by 0.055 per mille."""
 Stiffness = Annotated[float, Field(gt=0.0, le=STIFFEST)]
+
+
+def rope(team: Team) -> float:
+    """EA of a rope as thick as the team's load asks for, N."""
+    return min(ROPE * (team.load_mass / CARRIED), STIFFEST)
 
 
 class ChainPart(BodiesPart):

@@ -9,10 +9,7 @@ import numpy as np
 
 from colift.part import Vector
 from colift.team import Team
-from colift.world.plant._chain import ROPE, STIFFEST, ChainPart, Stiffness
-
-CARRIED = 0.225
-"""Load that a rope of 1 mm is taken for, kg: the paper's. Held by one such rope, it stretches it by 0.055 per mille."""
+from colift.world.plant._chain import ChainPart, Stiffness, rope
 
 
 class ElasticCables(ChainPart):
@@ -25,8 +22,7 @@ class ElasticCables(ChainPart):
     1 mm) for the paper's 0.225 kg and in proportion for others."""
 
     def left_open(self, team: Team) -> dict[str, Vector]:
-        EA = min(ROPE * (team.load_mass / CARRIED), STIFFEST)
-        return {"stiffness": np.full(team.n, EA)}
+        return {"stiffness": np.full(team.n, rope(team))}
 
     def tautness(self, team: Team) -> Vector:
         return self.settled("stiffness", team)

@@ -10,8 +10,9 @@ damping of ours (:mod:`colift.world.plant._contact`) and MuJoCo's own friction. 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from colift.kernel.math.winch import paid_out, turning
 from colift.part import Vector
 from colift.team import Team
 from colift.world.plant._bodies import BODY, DRONE, LOAD, MASS, BodiesPart, state_size
+from colift.world.plant._chain import rope
 from colift.world.plant._contact import RATE
 from colift.world.plant._params import P
 
@@ -28,6 +30,8 @@ SETTINGS = 4
 """Parameters after those of the bodies: time constant, damping ratio, impedance, substeps."""
 
 
+SHORTEST = 0.002
+"""Time constant that no team's numbers go below, s: two steps of MuJoCo, which would need more of them."""
 FINER = 20
 """Steps in place of one while a winch turns: a tendon's limit stands still within each, and would pull in jerks."""
 GRAIN = 1e-3
@@ -223,8 +227,11 @@ class Mujoco(BodiesPart):
     anchored = False
     needs = ("mujoco", "mujoco")
 
-    time_constant: Annotated[float, Field(ge=1e-4, le=1.0)] = 0.002
-    """In which an error of a cable's length decays, s."""
+    from_team: ClassVar[Mapping[str, float | None]] = {"time_constant": None}
+
+    time_constant: Annotated[float, Field(ge=1e-4, le=1.0)] | None = None
+    """In which an error of a cable's length decays, s. None: that of drone and load on the rope that `elastic-cables` has for the team,
+    the shortest of its cables', and no less than 0.002."""
     damping_ratio: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
     """Of that decay."""
     impedance: Annotated[float, Field(ge=0.5, le=0.9999)] = 0.999
@@ -232,13 +239,22 @@ class Mujoco(BodiesPart):
     substeps: Annotated[int, Field(ge=1, le=100)] = 1
     """MuJoCo's steps per physics step; more where the time constant would be less than two of them."""
 
+    def left_open(self, team: Team) -> dict[str, Vector]:
+        swinging = 1.0 / (1.0 / team.masses + 1.0 / team.load_mass)
+        decays = np.sqrt(swinging * team.cable_lengths / rope(team))
+        return {"time_constant": np.full(team.n, max(float(decays.min()), SHORTEST))}
+
+    def decay(self, team: Team) -> float:
+        """The time constant, s."""
+        return float(self.settled("time_constant", team)[0])
+
     def stretched(self, team: Team, tensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        softness = (1.0 - self.impedance) * (self.time_constant * self.damping_ratio) ** 2
+        softness = (1.0 - self.impedance) * (self.decay(team) * self.damping_ratio) ** 2
         give = softness * tensions * (1.0 / team.masses + 1.0 / team.load_mass)
         return np.asarray(team.cable_lengths + give)
 
     def params(self, team: Team) -> Vector:
-        settings = [self.time_constant, self.damping_ratio, self.impedance, self.substeps]
+        settings = [self.decay(team), self.damping_ratio, self.impedance, self.substeps]
         return np.append(super().params(team), settings)
 
     def memory(self, team: Team) -> Vector:
