@@ -40,6 +40,25 @@ class Images(HTMLParser):
 
 
 @pytest.mark.slow
+def test_who_decides_is_compared_over_one_radio(tmp_path: Path) -> None:
+    chosen = ("--agents", "--missions", "hover", "--seeds", "2", *SHORT)
+    done = colift("compare", *chosen, "--out", "out", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert {"central", "leaderless", "exchange-admm"} <= {*result["agents"]}
+    for found in result["agents"].values():
+        assert found["flights"] == found["held"] == 2
+        low, high = found["intervals"]["tracking_rms_m"]
+        assert low < found["values"]["tracking_rms_m"] < high
+    assert "Kinds of agents compared" in (tmp_path / "out/report.html").read_text()
+    again = colift("compare", *chosen, "--out", "out", folder=tmp_path)
+    assert f"All {result['flown']} flights were there already." in again.stdout
+    both = colift("compare", "--schemes", "central", "--allocators", "safe")
+    assert both.returncode == 2
+    assert "compares allocators" in both.stderr
+
+
+@pytest.mark.slow
 def test_an_allocator_of_ones_own_takes_part_without_touching_the_package(tmp_path: Path) -> None:
     assert len(EXAMPLE.read_text().splitlines()) < 40
     chosen = (

@@ -72,6 +72,36 @@ def test_an_allocator_may_fly_as_in_the_mission() -> None:
     assert plain != load_mission("real-world-adaptive").allocation
 
 
+def test_agents_fly_over_one_radio_whoever_decides() -> None:
+    changes = {"network.loss": 0.4, "leaderless.patience": 0.2}
+    found = compare.cases(
+        ["central", "leaderless"], ["hover", "leaderless"], [3], changes, layer="agents"
+    )
+    assert {case.labels["study"] for case in found} == {compare.CONTEST}
+    flown = {(case.labels["agents"], case.labels["mission"]): case.load() for case in found}
+    for name in ("hover", "leaderless"):
+        central, agents = flown["central", name], flown["leaderless", name]
+        for mission in (central, agents):
+            assert mission.kinds["network"] == mission.kinds["link"] == "radio"
+            for field in ("delay", "jitter", "loss"):
+                assert getattr(mission.link, field) == getattr(mission.network, field)
+            assert (mission.network.loss, mission.network.delay) == (0.4, 0.01)
+            assert (
+                mission.criteria["min_angle_deg"].min == {"hover": 30.0, "leaderless": 25.0}[name]
+            )
+        assert (central.kinds["agents"], agents.kinds["agents"]) == ("central", "leaderless")
+        assert agents.agents.patience == 0.2
+        assert central.allocation == agents.allocation
+    deaf = compare.radio("hover", {"network.loss": 1.0})
+    assert deaf["link"]["loss"] == compare.MOST_LOST
+    told = compare.radio("hover", {"network": {"kind": "perfect"}})
+    assert told["link"] == {"kind": "perfect"}
+    with pytest.raises(ColiftError, match="--schemes"):
+        compare.cases(["central"], ["hover"], [0], {"agents.kind": "leaderless"}, layer="agents")
+    (said, *_) = compare.protocol(["hover"], [0], {}, layer="agents")
+    assert "loses 20% of messages and takes 10 to 30 ms" in said
+
+
 def test_the_spread_is_swept_over_whatever_else_is_set() -> None:
     found = compare.cases(["safe"], ["hover"], [7], {"safe.mu": 0.7}, as_in_mission=True)
     swept = [case for case in found if case.labels["study"] == compare.SPREAD]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colift.kernel.math.shares import interval, percent, text
+from colift.kernel.math.shares import interval, mean_interval, percent, text
 
 
 def at_least(hits: int, trials: int, share: float) -> float:
@@ -69,3 +70,15 @@ def test_texts_round_outwards() -> None:
     assert text(236, 240) == "236/240 (95.7-99.6 %)"
     assert text(0, 0) == "0/0"
     assert percent(0.25, 0.5, 0) == "25-50 %"
+
+
+def test_a_mean_lies_in_its_interval_about_as_often_as_is_said() -> None:
+    random, inside = np.random.default_rng(11), 0
+    for _ in range(400):
+        found = mean_interval([random.normal(1.0, 1.0, 15).tolist(), random.normal(5.0, 1.0, 15)])
+        assert found is not None
+        inside += found[0] <= 3.0 <= found[1]  # groups far apart make no interval wider
+    assert 0.90 < inside / 400 < 0.97
+    assert mean_interval([[2.0, 2.0], [4.0]]) == pytest.approx((8.0 / 3.0, 8.0 / 3.0))
+    assert mean_interval([[1.0], [2.0]]) is None
+    assert mean_interval([]) is None

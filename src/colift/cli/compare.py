@@ -1,4 +1,4 @@
-"""`colift compare`: allocators side by side."""
+"""`colift compare`: allocators, or teams with and without a leader, side by side."""
 
 from __future__ import annotations
 
@@ -48,6 +48,19 @@ Allocators = Annotated[
     str | None,
     typer.Option(metavar="A,B,...", help="Who takes part.", show_default="all installed"),
 ]
+Agents = Annotated[
+    bool,
+    typer.Option(
+        "--agents",
+        help="Compare who decides: one allocator for all, or each drone; over the same radio.",
+    ),
+]
+Schemes = Annotated[
+    str | None,
+    typer.Option(
+        metavar="A,B,...", help="Which of these; as --agents.", show_default="all installed"
+    ),
+]
 Missions = Annotated[
     str | None,
     typer.Option(metavar="M,N,...", help="Missions.", show_default="five of the shipped"),
@@ -67,6 +80,8 @@ AsInMission = Annotated[
 @app.command()
 def compare(
     allocators: Allocators = None,
+    agents: Agents = False,
+    schemes: Schemes = None,
     missions: Missions = None,
     seeds: Seeds = 3,
     first_seed: FirstSeed = 0,
@@ -85,7 +100,7 @@ def compare(
     parquet: Parquet = None,
     as_json: Json = False,
 ) -> None:
-    """Fly every allocator on the same missions; say who is best at what, and what separation costs.
+    """Fly every allocator, or all that can take one's place, on the same missions; say who is best at what, and what separation costs.
 
     Each has its own default settings; --set safe.mu=0.3 changes that of one, --set allocation.mu=0.3 that of all. A
     flight is held if it keeps every criterion of its mission to the end. With --out DIR of an earlier, perhaps interrupted comparison, only what is missing is flown.
@@ -95,23 +110,37 @@ def compare(
       colift compare
       colift compare --allocators sqp,safe --missions hover,my-mission.toml --seeds 10
       colift compare --with examples/my_allocator.py --quick
+      colift compare --agents --set network.loss=0.5
     """
     from colift.mission.load import parse_overrides
 
+    agents = agents or schemes is not None
+    if agents and allocators is not None:
+        raise typer.BadParameter(
+            "compares allocators; leave out --agents and --schemes", param_hint="--allocators"
+        )
+    layer, wanted = ("agents", schemes) if agents else ("allocation", allocators)
     with loading():
         from colift.study import compare as study
         from colift.study.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
-        own = study.own_allocators(sources)
-        able, missing = study.contestants(several(allocators) or None, own)
+        own = study.own_parts(sources, layer)
+        able, missing = study.contestants(several(wanted) or None, own, layer)
         changes = parse_overrides(sets)
         if quick:
             seeds, changes = 1, {"timing.duration": 4.0, **changes}
-        chosen = several(missions) or (study.QUICK_MISSIONS if quick else study.MISSIONS)
+        usual = study.AGENTS_MISSIONS if agents else study.MISSIONS
+        chosen = several(missions) or (study.QUICK_MISSIONS if quick else usual)
         flown_seeds = range(first_seed, first_seed + seeds)
         cases = study.cases(
-            able, chosen, flown_seeds, changes, spread=spread, as_in_mission=as_in_mission
+            able,
+            chosen,
+            flown_seeds,
+            changes,
+            spread=spread,
+            as_in_mission=as_in_mission,
+            layer=layer,
         )
         planned, refused = sift(cases, sources)
     say_refused(refused)
@@ -121,7 +150,7 @@ def compare(
         retry_failed=retry_failed, recordings=recordings,
     )  # fmt: skip
     rows = in_order(cases, outcome.rows, refused)
-    notes = study.protocol(chosen, flown_seeds, changes, as_in_mission=as_in_mission)
+    notes = study.protocol(chosen, flown_seeds, changes, as_in_mission=as_in_mission, layer=layer)
     result = {
         **_judge(rows, target, notes),
         "missions": list(chosen), "seeds": seeds, "first_seed": first_seed, "protocol": notes,
@@ -141,20 +170,21 @@ def compare(
 def _judge(rows: Sequence[dict[str, Any]], target: Path, notes: Sequence[str]) -> dict[str, Any]:
     """Who is best at what; the page that says so is written."""
     from colift.kernel.math.shares import interval
-    from colift.show.report.campaign import write_contest
+    from colift.show.report.campaign import COMPARED, write_contest
     from colift.study.campaign import judge
     from colift.study.compare import CONTEST
 
     contest = [row for row in rows if row["study"] == CONTEST]
     field = judge.contestants(contest)
-    words = judge.words(field, judge.criteria_of(contest))
+    column = judge.compared(contest)
+    words = judge.words(field, judge.criteria_of(contest), COMPARED[column])
     page = write_contest(rows, target, words, command=command_line(), notes=notes)
     return {
-        "allocators": {
+        {"allocator": "allocators"}.get(column, column): {
             c.name: {
                 "flights": c.flights, "held": c.held, "interval": interval(c.held, c.flights),
                 "missed": c.missed, "lost": c.lost, "failed": c.failed, "refused": c.refused,
-                "values": dict(c.values),
+                "values": dict(c.values), "intervals": dict(c.intervals),
             }
             for c in field
         },

@@ -1,10 +1,12 @@
-"""The campaign behind ``colift compare``: allocators x missions x seeds, and a sweep of each one's spread."""
+"""The campaign behind ``colift compare``: allocators, or agents, x missions x seeds, and a sweep of each allocator's spread."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from colift.errors import ColiftError
 from colift.mission.load import layered, load_mission
@@ -17,8 +19,17 @@ from colift.study.campaign.plan import HEADING, OFFSET, Case, Source, without_se
 MISSIONS = ("hover", "paper-spiral", "figure-eight", "point-to-point", "four-to-three")
 """Missions of a comparison unless others are asked for."""
 
+AGENTS_MISSIONS = ("leaderless", *MISSIONS)
+"""Missions of a comparison of agents."""
+
 QUICK_MISSIONS = ("hover", "figure-eight")
 """Missions of a quick one."""
+
+COLUMN = {"allocation": "allocator", "agents": "agents"}
+"""By layer that is compared the column in which its parts are named."""
+
+RADIO: dict[str, Any] = {"kind": "radio", "loss": 0.2, "delay": 0.01, "jitter": 0.02}
+"""What a mission without a radio of its own is given in a comparison of agents: s and share of messages."""
 
 PERIOD = 0.01
 """Period at which every contestant allocates, s: what the slowest of them can keep on a desktop."""
@@ -29,71 +40,76 @@ LEAST_ANGLE = 30.0
 LEAST_DISTANCE = 2.0 * math.sin(math.radians(0.5 * LEAST_ANGLE))
 """Least distance between two drones on a rigid load, over the shortest cable: what that angle leaves them on a point."""
 
+MOST_LOST = 0.999
+"""Largest share of what central tells that is lost, where others may hear nothing at all."""
+
 CONTEST, SPREAD = "contest", "spread"
 """The two studies: who flies how well, and what separation costs."""
 
 
 def contestants(
-    wanted: Sequence[str] | None, own: Sequence[str] = ()
+    wanted: Sequence[str] | None, own: Sequence[str] = (), layer: str = "allocation"
 ) -> tuple[list[str], list[str]]:
-    """Allocators that can fly here, and a sentence for each that cannot.
+    """Allocators, or parts of another layer, that can fly here, and a sentence for each that cannot.
 
     ``wanted`` None stands for all; ``own`` are always among them.
     """
     able, missing = [], []
-    for name in dict.fromkeys([*(answering("allocation") if wanted is None else wanted), *own]):
-        why = find("allocation", name).missing()
+    for name in dict.fromkeys([*(answering(layer) if wanted is None else wanted), *own]):
+        why = find(layer, name).missing()
         if not why:
             able.append(name)
         elif wanted is None:
             missing.append(f"{name} {why}")
         else:
-            raise ColiftError(f"allocator {name} {why}")
+            raise ColiftError(f"{COLUMN[layer]} {name} {why}")
     return able, missing
 
 
 def cases(
-    allocators: Sequence[str],
+    names: Sequence[str],
     missions: Sequence[str],
     seeds: Iterable[int],
     changes: Mapping[str, Any] | None = None,
     *,
     spread: bool = True,
     as_in_mission: bool = False,
+    layer: str = "allocation",
 ) -> list[Case]:
-    """Every flight of a comparison.
+    """Every flight of a comparison of allocators, or, with ``layer`` "agents", of who decides.
 
-    Each contestant flies with its own default settings in place of the mission's allocation section (with
-    ``as_in_mission``, the one that a mission names keeps that section), and allocates every :data:`PERIOD`.
+    Each contestant flies with its own default settings in place of the mission's section of that ``layer`` (with
+    ``as_in_mission``, the one that a mission names keeps that section), and allocates every :data:`PERIOD`. Agents have the same
+    radio, see :func:`radio`.
     ``changes`` come last; one such as ``"safe.mu"`` is made for that contestant only. All are judged by
     the criteria of the mission as it is, see :func:`bounds`. The spread of those that declare a
     :attr:`~colift.control.allocation.base.AllocatorPart.spread_setting` is swept on the first mission.
     """
     changes, seeds = without_seed(changes), list(seeds)
-    if "allocation" in changes or "allocation.kind" in changes:
-        raise ColiftError(
-            "allocation.kind is what compare varies; name contestants with --allocators"
-        )
+    if layer in changes or f"{layer}.kind" in changes:
+        option = {"allocation": "--allocators", "agents": "--schemes"}[layer]
+        raise ColiftError(f"{layer}.kind is what compare varies; name contestants with {option}")
     loaded = {mission: load_mission(mission) for mission in missions}
     asked = {name: bounds(mission) for name, mission in loaded.items()}
+    heard = {name: radio(name, changes) if layer == "agents" else {} for name in missions}
 
     def case(study: str, name: str, mission: str, seed: int, **setting: Any) -> Case:
-        labels = {"study": study, "allocator": name, "mission": mission, "seed": seed, **setting}
-        given = {"criteria": asked[mission], "timing.allocation": PERIOD}
-        if not (as_in_mission and loaded[mission].kinds["allocation"] == name):
-            given["allocation"] = {"kind": name}
-        swept = {f"allocation.{setting['setting']}": setting["value"]} if setting else {}
-        own = _own(changes, name, allocators)
+        labels = {"study": study, COLUMN[layer]: name, "mission": mission, "seed": seed, **setting}
+        given = {"criteria": asked[mission], "timing.allocation": PERIOD, **heard[mission]}
+        if not (as_in_mission and loaded[mission].kinds[layer] == name):
+            given[layer] = {"kind": name}
+        swept = {f"{layer}.{setting['setting']}": setting["value"]} if setting else {}
+        own = _own(changes, name, names, layer)
         return Case(labels, mission, layered(given, own, swept), seed)
 
     found = [
         case(CONTEST, name, mission, seed)
         for seed in seeds
         for mission in missions
-        for name in allocators
+        for name in names
     ]
-    for name in allocators if spread else ():
-        setting, values = find("allocation", name).spread_setting or ("", ())  # type: ignore[attr-defined]
+    for name in names if spread else ():
+        setting, values = getattr(find(layer, name), "spread_setting", None) or ("", ())
         found += [
             case(SPREAD, name, missions[0], seeds[0], setting=setting, value=value)
             for value in values
@@ -101,14 +117,34 @@ def cases(
     return found
 
 
-def _own(changes: Mapping[str, Any], name: str, allocators: Sequence[str]) -> dict[str, Any]:
+def radio(name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """What all agents hear each other by in a mission, and the link by which one allocator tells all: delay, jitter and loss are the same.
+
+    It is the mission's network, changed by ``changes``; where that is perfect the mission's link, or :data:`RADIO`.
+    """
+    given = {path: value for path, value in changes.items() if path.partition(".")[0] == "network"}
+    loaded = load_mission(name)
+    if loaded.kinds["network"] == "perfect":
+        told = loaded.link.model_dump() if loaded.kinds["link"] == "radio" else RADIO
+        given = layered(
+            {"network": {key: told[key] for key in RADIO if key in told} | {"kind": "radio"}}, given
+        )
+    network = load_mission(name, given).network.model_dump()
+    if "loss" not in network:
+        return {**given, "link": {"kind": "perfect"}}
+    most = np.minimum(network["loss"], MOST_LOST).tolist()
+    link = {"kind": "radio", "loss": most, **{key: network[key] for key in ("delay", "jitter")}}
+    return {**given, "link": link}
+
+
+def _own(changes: Mapping[str, Any], name: str, names: Sequence[str], layer: str) -> dict[str, Any]:
     """The changes that concern one contestant, as those of the mission that it flies."""
     found: dict[str, Any] = {}
     for path, value in changes.items():
         head, _, setting = path.partition(".")
         if head == name and setting:
-            found = layered(found, {f"allocation.{setting}": value})
-        elif head not in allocators:
+            found = layered(found, {f"{layer}.{setting}": value})
+        elif head not in names:
             found = layered(found, {path: value})
     return found
 
@@ -136,6 +172,7 @@ def protocol(
     changes: Mapping[str, Any],
     *,
     as_in_mission: bool = False,
+    layer: str = "allocation",
 ) -> list[str]:
     """How the flights were made and judged, in sentences."""
     period, seeds = float(changes.get("timing.allocation", PERIOD)), list(seeds)
@@ -146,6 +183,13 @@ def protocol(
         f"Every allocator has {settings} and is called every {1e3 * period:g} ms, so that "
         "slow ones can take part; reference, controllers, drones and plant are the mission's."
     ]
+    if layer == "agents":
+        said = [
+            f"All agents have {settings} and decide every {1e3 * period:g} ms; allocator, reference, controllers, drones and plant "
+            "are the mission's. All hear each other by the mission's network, where that is perfect by one that loses "
+            f"{RADIO['loss']:.0%} of messages and takes {1e3 * RADIO['delay']:g} to {1e3 * (RADIO['delay'] + RADIO['jitter']):g} ms; "
+            "what central tells the drones is as late and lost as often. Times are of all drones together."
+        ]
     groups: dict[str, list[str]] = {}
     for mission in missions:
         asked = bounds(load_mission(mission))
@@ -170,8 +214,6 @@ def protocol(
     return said
 
 
-def own_allocators(sources: Sequence[Source]) -> list[str]:
-    """Names of the allocators in a user's files, which are registered by this."""
-    return [
-        source.name for source in sources for part in source.load() if part.layer == "allocation"
-    ]
+def own_parts(sources: Sequence[Source], layer: str = "allocation") -> list[str]:
+    """Names of the allocators, or parts of another layer, in a user's files, which are registered by this."""
+    return [source.name for source in sources for part in source.load() if part.layer == layer]

@@ -1,12 +1,17 @@
-"""Shares with what they leave open: the exact interval of Clopper and Pearson."""
+"""Shares and means with what they leave open: the exact interval of Clopper and Pearson, and the bootstrap's."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 
+import numpy as np
+
 CONFIDENCE = 0.95
-"""How often an interval holds the true share, at least."""
+"""How often an interval holds the true share, at least; of means nearly."""
+DRAWS = 4000
+"""Of the bootstrap."""
 
 
 @cache
@@ -28,6 +33,23 @@ def interval(hits: int, trials: int, confidence: float = CONFIDENCE) -> tuple[fl
     low = 0.0 if hits == 0 else _where(tail, hits, trials - hits + 1)
     high = 1.0 if hits == trials else _where(1.0 - tail, hits + 1, trials - hits)
     return low, high
+
+
+def mean_interval(groups: Sequence[Sequence[float]]) -> tuple[float, float] | None:
+    """The means of all numbers that chance leaves open; None where no group has two.
+
+    95 % of the means of numbers drawn anew from each group, with replacement (Efron and Tibshirani, "An introduction to the bootstrap", 1993,
+    section 13.3), always the same draws.
+    """
+    count = sum(map(len, groups))
+    if all(len(group) < 2 for group in groups):
+        return None
+    random, total = np.random.default_rng(0), np.zeros(DRAWS)
+    for group in groups:
+        total += np.asarray(group)[random.integers(0, len(group), (DRAWS, len(group)))].sum(axis=1)
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(total / count, [tail, 100.0 - tail])
+    return float(low), float(high)
 
 
 def text(hits: int, trials: int) -> str:

@@ -1,4 +1,4 @@
-"""The pages of campaigns: allocators compared, and one mission swept. Made from rows of results."""
+"""The pages of campaigns: allocators or agents compared, and one mission swept. Made from rows of results."""
 
 from __future__ import annotations
 
@@ -22,13 +22,20 @@ Table = tuple[list[str], list[list[str]]]
 
 
 def contest_table(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> Table:
-    """One line an allocator: flights held and these criteria over them."""
-    header = ["allocator", "held (95 %)", *(_title(criterion) for criterion in criteria)]
+    """One line an allocator, or a kind of agents: flights held and these criteria over them, means with their 95 % interval."""
+    header = [judge.compared(rows), "held (95 %)", *(_title(criterion) for criterion in criteria)]
     lines = [
-        [c.name, shares.text(c.held, c.flights), *(k.text(c.values[k.metric]) for k in criteria)]
+        [c.name, shares.text(c.held, c.flights), *(_value(c, criterion) for criterion in criteria)]
         for c in judge.contestants(rows)
     ]
     return header, lines
+
+
+def _value(contestant: judge.Contestant, criterion: judge.Criterion) -> str:
+    said = criterion.text(contestant.values[criterion.metric])
+    if found := contestant.intervals.get(criterion.metric):
+        said += " (" + "-".join(map(criterion.text, found)) + ")"
+    return said
 
 
 def _grouped_tables(rows: Sequence[Row], criteria: Sequence[judge.Criterion]) -> list[str]:
@@ -72,17 +79,18 @@ def write_contest(
     contest = [row for row in rows if row.get("study", "contest") == "contest"]
     criteria = judge.criteria_of(contest)
     field = judge.contestants(contest)
+    who = COMPARED[judge.compared(contest)]
     missions = list(dict.fromkeys(str(row["mission"]) for row in contest))
     # Figures are of flights that were held, which here and there are none.
     loads = {judge.load_of(row) for row in contest if judge.held(row)}
     shown = {name: entry for name, entry in CONTEST.items() if loads & {*(entry.needs or loads)}}
     drawings = draw(shown, rows)
     body = [
-        "<header><h1>Allocators compared</h1>",
+        f"<header><h1>{who.capitalize()} compared</h1>",
         f'<p class="soft">{escape(" ".join(notes))}</p></header>',
         html.facts(
             [
-                f"{len(field)} allocators",
+                f"{len(field)} {who}",
                 f"{len(missions)} mission{'s' * (len(missions) != 1)}",
                 f"{len(contest)} flights",
                 f"{sum(c.held for c in field)} held",
@@ -105,10 +113,12 @@ def write_contest(
         body += [f"<h3>{escape(mission)}</h3>", _html_table(*contest_table(own, criteria))]
     body += ["<h2>How the numbers are made</h2>", _rules(criteria)]
     body += [*_failures(rows), *provenance(command)]
-    return _write(folder, "Allocators compared", body, drawings)
+    return _write(folder, f"{who.capitalize()} compared", body, drawings)
 
 
-_HELD = "Over the flights that were held: to the end, every criterion kept. The share of them has its exact 95 % interval."
+COMPARED = {"allocator": "allocators", "agents": "kinds of agents"}
+"""By column of the rows who is compared."""
+_HELD = "Over the flights that were held: to the end, every criterion kept. The share of them has its exact 95 % interval, a mean that of the bootstrap over the seeds."
 
 
 def _rules(criteria: Sequence[judge.Criterion]) -> str:

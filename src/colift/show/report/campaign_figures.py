@@ -29,8 +29,8 @@ MARKS = "osD^vPX*<>"
 
 
 def _looks(rows: Rows) -> dict[str, dict[str, Any]]:
-    """Colour and marker of each allocator, the same in every figure."""
-    names = dict.fromkeys(str(row["allocator"]) for row in rows)
+    """Colour and marker of each contestant, the same in every figure."""
+    names = dict.fromkeys(map(judge.name_of, rows))
     return {
         name: {"color": style.drone(k)["color"], "marker": MARKS[k % len(MARKS)]}
         for k, name in enumerate(names)
@@ -65,8 +65,10 @@ def separation(rows: Rows) -> Figure:
     rigid = judge.load_of((swept or contest)[0]) == judge.RIGID
     metric = "min_drone_distance_m" if rigid else "usual_angle_deg"
     for name, look in _looks(rows).items():
-        line = sorted((r for r in swept if r["allocator"] == name), key=lambda r: float(r["value"]))
-        alone = [r for r in contest if (r["allocator"], r["mission"]) == (name, first)][:1]
+        line = sorted(
+            (r for r in swept if judge.name_of(r) == name), key=lambda r: float(r["value"])
+        )
+        alone = [r for r in contest if (judge.name_of(r), r["mission"]) == (name, first)][:1]
         shown = [(r["mean_total_tension_N"], r[metric]) for r in line or alone]
         label = f"{name}: {line[0]['setting']}" if line else name
         axes.plot(*zip(*shown, strict=True), label=label, markersize=4 if line else 8, **look)
@@ -179,7 +181,7 @@ def _by_mission(
             values = [
                 scale * float(row[metric])
                 for row in contest
-                if row["allocator"] == name and row["mission"] == mission
+                if judge.name_of(row) == name and row["mission"] == mission
             ]
             if values:
                 x = m + shift

@@ -1,6 +1,6 @@
 """Who is best at what: summaries and plain words, computed from rows of results and from nothing else.
 
-A row is one flight as a mapping: ``allocator``, ``status``, ``level`` (of its verdict), ``outcome`` and metrics by
+A row is one flight as a mapping: ``allocator`` (or ``agents``), ``status``, ``level`` (of its verdict), ``outcome`` and metrics by
 name, wherever it comes from. Rows without ``status`` count as flown, those without a verdict as held if their
 ``outcome`` is ``"completed"`` or not there; a metric that no row has is left out.
 """
@@ -13,6 +13,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from colift.kernel.math import shares
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,17 @@ class Criterion:
         found = [float(flight.get(self.metric, math.nan)) for flight in own]
         found = [number for number in found if not math.isnan(number)]
         return self.scale * self.gather(found) if found else math.nan
+
+    def interval(self, flights: Iterable[Mapping[str, Any]]) -> tuple[float, float] | None:
+        """What chance leaves open of a mean, in ``unit``: 95 %, with the missions as they are; None of what is no mean, or flown once."""
+        if self.how != "mean":
+            return None
+        found: dict[str, list[float]] = {}
+        for flight in flights:
+            value = self.scale * float(flight.get(self.metric, math.nan))
+            if self.load in ("", load_of(flight)) and not math.isnan(value):
+                found.setdefault(str(flight.get("mission")), []).append(value)
+        return shares.mean_interval(list(found.values()))
 
     def text(self, value: float) -> str:
         """A value for people, without unit."""
@@ -121,7 +134,7 @@ ANGLE, DISTANCE, EFFORT = (
 
 @dataclass(frozen=True)
 class Contestant:
-    """What the flights of one allocator come to.
+    """What the flights of one allocator, or of one kind of agents, come to.
 
     Attributes
     ----------
@@ -131,6 +144,8 @@ class Contestant:
         possible to set up.
     values : mapping
         Criterion's metric to its value over the flights held; NaN where none was.
+    intervals : mapping
+        For those that are means the 95 % interval over the seeds of each mission; where there are two flights of one.
 
     """
 
@@ -142,6 +157,7 @@ class Contestant:
     failed: int
     refused: int
     values: Mapping[str, float]
+    intervals: Mapping[str, tuple[float, float]]
 
     @property
     def ranked(self) -> bool:
@@ -176,12 +192,22 @@ def criteria_of(rows: Iterable[Mapping[str, Any]]) -> list[Criterion]:
     return [c for c in CRITERIA if c.metric in names and c.load in loads]
 
 
+def compared(rows: Iterable[Mapping[str, Any]]) -> str:
+    """The column in which contestants are named: ``agents`` or ``allocator``."""
+    return "agents" if any("agents" in row for row in rows) else "allocator"
+
+
+def name_of(row: Mapping[str, Any]) -> str:
+    """Of the contestant that flew."""
+    return str(row[compared([row])])
+
+
 def contestants(rows: Sequence[Mapping[str, Any]]) -> list[Contestant]:
-    """One summary an allocator, in the order of first mention; runs that are missing do not count."""
+    """One summary an allocator, or a kind of agents, in the order of first mention; runs that are missing do not count."""
     rows = [row for row in rows if row.get("status") != "missing"]
-    found = []
-    for name in dict.fromkeys(str(row["allocator"]) for row in rows):
-        own = [row for row in rows if row["allocator"] == name]
+    found, criteria = [], criteria_of(rows)
+    for name in dict.fromkeys(map(name_of, rows)):
+        own = [row for row in rows if name_of(row) == name]
         good = [row for row in own if held(row)]
         fates = Counter(map(fate, own))
         found.append(
@@ -189,7 +215,8 @@ def contestants(rows: Sequence[Mapping[str, Any]]) -> list[Contestant]:
                 name=name,
                 flights=len(own),
                 **{each: fates[each] for each in _FATES},
-                values={c.metric: c.value(good) for c in criteria_of(rows)},
+                values={c.metric: c.value(good) for c in criteria},
+                intervals={c.metric: each for c in criteria if (each := c.interval(good))},
             )
         )
     return found
@@ -221,10 +248,14 @@ def undominated(field: Sequence[Contestant]) -> list[str]:
     return [c.name for c in entered if not any(beats(other, c) for other in entered)]
 
 
-def words(field: Sequence[Contestant], criteria: Sequence[Criterion] = CRITERIA) -> list[str]:
+def words(
+    field: Sequence[Contestant],
+    criteria: Sequence[Criterion] = CRITERIA,
+    who: str = "allocators",
+) -> list[str]:
     """What the numbers say, a sentence each: who dropped out, who leads at what, who ties."""
     ranked = [c for c in field if c.ranked]
-    said = [_held_words(field)]
+    said = [_held_words(field, who)]
     said += [
         f"{c.name} is not ranked: of {c.flights} flights {_trouble(c)}."
         for c in field
@@ -269,12 +300,12 @@ _FATES = {
 """What can become of a flight, in words that follow a number of flights."""
 
 
-def _held_words(field: Sequence[Contestant]) -> str:
+def _held_words(field: Sequence[Contestant], who: str) -> str:
     flights = sum(c.flights for c in field)
     counts = {each: sum(getattr(c, each) for c in field) for each in _FATES}
     if counts["held"] == flights:
         return (
-            f"All {len(field)} allocators held all of their flights within every criterion "
+            f"All {len(field)} {who} held all of their flights within every criterion "
             f"({flights} in total)."
         )
     others = [
