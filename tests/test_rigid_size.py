@@ -127,6 +127,22 @@ def test_the_command_answers_for_a_box_and_a_mission() -> None:
     assert "9 kg: " in heavy.stdout
 
 
+@pytest.mark.parametrize("n", [1, 2, 6])
+def test_a_mission_is_asked_for_another_number_of_drones(n: int, tmp_path: Path) -> None:
+    source = tmp_path / "box.toml"
+    source.write_text(
+        'name = "box"\nreference.kind = "hover"\nload = {kind = "rigid", size = [0.6, 0.4, 0.2]}\n'
+        "drones = {count = 4, mass = 0.5, max_thrust = 12.0, arm = 0.15}\n"
+    )
+    answer = study.size(Question(source, {}, n, 0.3, at_most=3))
+    assert answer.ok
+    assert len(answer.limits) == len(answer.thrusts) == answer.mission.team.n == n
+    most = answer.places[study.AS_USUAL].most.load
+    assert 0.8 < most / (n * (12.0 / 9.81 - 0.5)) < 1.0
+    assert [*answer.held.losses] == [*range(n)]
+    assert answer.held.spares == (n == 6)
+
+
 def test_what_cannot_be_asked_is_refused_by_name() -> None:
     done = colift("size", "box-figure-eight", "--fly")
     assert done.returncode == 2

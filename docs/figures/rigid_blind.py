@@ -5,7 +5,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from pages import fill, stored, table
-from rigid_loads import LATE, PERIODS, SLOW
+from rigid_loads import HARDER, LATE, PERIODS, displaced, rms
 
 from colift.flight.flight import Flight
 from colift.mission import load_mission
@@ -34,13 +34,10 @@ CASES = {
 def mission_of(name, n, seed):
     """The shipped eight with noise, delay and layers at 100 Hz."""
     overrides = {
-        "drones.count": n, "seed": seed, "reference.period": PERIODS[n], "sensing.kind": "noisy", "timing.delay": 0.02,
-        **{f"timing.{layer}": period for layer, period in SLOW.items()}, **CASES[name],
+        "drones.count": n, "seed": seed, "reference.period": PERIODS[n], **HARDER, **CASES[name],
     }  # fmt: skip
     if "attachments" in name:
-        away = np.random.default_rng(seed).normal(size=(n, 3))
-        away *= 0.01 / np.linalg.norm(away, axis=1, keepdims=True)
-        overrides["truth.attachment_offset"] = away.tolist()
+        overrides |= displaced(n, seed)
     return load_mission("box-figure-eight", overrides)
 
 
@@ -53,16 +50,12 @@ def fly(job):
     pairs = zip(recording["load_attitude"], recording["estimated_load_attitude"], strict=True)
     turned = np.array([np.linalg.norm(from_to(*pair)[1:]) for pair in pairs])[late]
     sizes = [
-        100.0 * _rms(np.linalg.norm(metrics.tracking_error(recording)[late], axis=1)),
-        math.degrees(_rms(np.linalg.norm(metrics.attitude_error(recording)[late], axis=1))),
-        100.0 * _rms(np.linalg.norm(known, axis=1)),
-        math.degrees(_rms(2.0 * np.arcsin(np.minimum(turned, 1.0)))),
+        100.0 * rms(np.linalg.norm(metrics.tracking_error(recording)[late], axis=1)),
+        math.degrees(rms(np.linalg.norm(metrics.attitude_error(recording)[late], axis=1))),
+        100.0 * rms(np.linalg.norm(known, axis=1)),
+        math.degrees(rms(2.0 * np.arcsin(np.minimum(turned, 1.0)))),
     ]
     return {"case": name, "n": n, "seed": seed, "sizes": sizes, "outcome": recording.outcome}
-
-
-def _rms(values):
-    return math.sqrt(float(np.mean(values**2)))
 
 
 def foretold(n):

@@ -11,7 +11,13 @@ from colift.mission import load_mission
 from colift.record import metrics
 
 SEEDS = range(71_000, 71_010)
-SLOW = dict.fromkeys(("load_control", "allocation", "position_control", "attitude_control"), 0.01)
+LAYERS = ("load_control", "allocation", "position_control", "attitude_control")
+HARDER = {
+    "sensing.kind": "noisy",
+    "timing.delay": 0.02,
+    **{f"timing.{layer}": 0.01 for layer in LAYERS},
+}
+"""Noise, delay, and layers at 100 Hz."""
 CASES = {
     "ideal motors": {"actuation.kind": "ideal"},
     "motors with lag and limits": {},
@@ -27,18 +33,20 @@ LATE = 6.0
 """From when on errors count, s: when the eight has come up to speed."""
 
 
+def displaced(n, seed):
+    """Attachments of n cables that are 1 cm off, each in a direction of its own."""
+    away = np.random.default_rng(seed).normal(size=(n, 3))
+    away *= 0.01 / np.linalg.norm(away, axis=1, keepdims=True)
+    return {"truth.attachment_offset": away.tolist()}
+
+
 def mission_of(name, n, seed):
     """The shipped mission under the conditions of a case."""
     overrides = {"drones.count": n, "seed": seed, "reference.period": PERIODS[n], **CASES[name]}
     if name in NOISY:
-        overrides["sensing.kind"] = "noisy"
-        overrides |= {f"timing.{layer}": period for layer, period in SLOW.items()}
-        overrides["timing.delay"] = 0.02
+        overrides |= HARDER
     if name == NOISY[1]:
-        rng = np.random.default_rng(seed)
-        away = rng.normal(size=(n, 3))
-        away *= 0.01 / np.linalg.norm(away, axis=1, keepdims=True)
-        overrides["truth.attachment_offset"] = away.tolist()
+        overrides |= displaced(n, seed)
     return load_mission("box-figure-eight", overrides)
 
 
@@ -49,11 +57,11 @@ def fly(job):
     late = recording.time >= LATE
     place = 100.0 * np.linalg.norm(metrics.tracking_error(recording)[late], axis=1)
     turn = np.degrees(np.linalg.norm(metrics.attitude_error(recording)[late], axis=1))
-    sizes = [float(f(each)) for each in (place, turn) for f in (_rms, np.max)]
+    sizes = [float(f(each)) for each in (place, turn) for f in (rms, np.max)]
     return {"case": name, "n": n, "seed": seed, "sizes": sizes, "outcome": recording.outcome}
 
 
-def _rms(values):
+def rms(values):
     return math.sqrt(float(np.mean(values**2)))
 
 

@@ -322,6 +322,38 @@ def test_after_a_change_of_the_team_nobody_is_judged_for_a_while():
     assert Residuals().grace_of(team) == 0.0
 
 
+def test_while_a_load_tumbles_nobody_is_judged_but_not_for_ever():
+    """Two drones that are left with a box: what delay makes of ends that whirl is no sign of a cable, until they hang, or for four times the grace."""
+    dt, grace = 0.01, 1.0
+    team = load_mission("box-figure-eight", {"drones.count": 2}).team
+    part = Residuals(grace=grace)
+    q, down = np.tile([1.0, 0, 0, 0], (2, 1)), np.tile([0.0, 0.0, -1.0], (2, 1))
+    judged = {}
+    for calm_from in (0.0, 2.0, 9.0):
+        memory = part.carry_over(part.memory(team), part.memory(team), np.array([0, 1]))
+        carrying, judged[calm_from] = np.ones(2), np.nan
+        for step in range(600):
+            time = (step + 1) * dt  # since the change, when the step ends
+            whirl = 6.0 if time < calm_from else 0.5
+            ends = np.zeros((2, 2, 3))
+            ends[:, 0, 0], ends[:, 1, 1] = (-0.3, 0.3), (-0.3 * whirl, 0.3 * whirl)
+            parting = 1.0 + 0.5 * max(time - 0.8, 0.0)  # of the first cable
+            ends[0, 0, 2], ends[0, 1, 2] = -parting, -0.5 * (time > 0.8)
+            ends[1, 0, 2] = -1.0
+            positions = ends[:, 0] + (0.0, 0.0, 1.0)
+            positions[0, 2] = 0.0
+            part.call(
+                team, memory, dt=dt, estimated_ends=ends, estimated_positions=positions, estimated_velocities=ends[:, 1] * (1.0, 1.0, 0.0),
+                estimated_attitudes=q, thrusts=team.masses * team.gravity, received_directions=down, carrying=carrying,
+            )  # fmt: skip
+            if not carrying[0]:
+                judged[calm_from] = time
+                break
+    assert 1.0 <= judged[0.0] < 1.1
+    assert 3.0 <= judged[2.0] < 3.1
+    assert 4.0 <= judged[9.0] < 4.1
+
+
 def test_a_cable_that_was_slack_for_long_catches_without_an_alarm():
     taut, slack = np.full(400, 1.0), np.full(800, 0.97)
     catching = np.linspace(0.97, 1.0, 12)

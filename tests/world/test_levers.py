@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.record import metrics
@@ -71,6 +72,31 @@ def test_a_point_is_turned_by_nothing() -> None:
     assert not moment.any()
     _, moment = acted(Drag(), team, wind=np.array([5.0, 0.0, 0.0]))
     assert not moment.any()
+
+
+def test_a_push_turns_about_the_centre_of_mass_that_is_there_not_the_one_that_is_told() -> None:
+    force, point, off = [0.1, 0.2, 0.0], np.array([0.3, -0.2, 0.1]), np.array([0.03, 0.02, 0.0])
+    push = {"kind": "push", "force": force, "point": point.tolist(), "duration": 60.0}
+    changes = {
+        "reference": {"kind": "hover"}, "disturbance": [push], "truth.centre_of_mass_offset": off.tolist(),
+    }  # fmt: skip
+    flight = Flight(load_mission("box-figure-eight", changes))
+    flight.advance(flight.mission.timing.step)
+    about = np.cross(point - off, force)
+    np.testing.assert_allclose(flight.bus.external_moment, about, atol=1e-6)
+    flight.change("disturbance.0.force", [0.0, 0.0, 0.3])
+    flight.advance(flight.mission.timing.step)
+    about = np.cross(point - off, [0.0, 0.0, 0.3])
+    np.testing.assert_allclose(flight.bus.external_moment, about, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("part", "field"),
+    [({"kind": "push", "point": [0.1, 0, 0]}, "point"), ({"kind": "drag", "load_centre": [0, 0, 0.1]}, "load_centre")],
+)  # fmt: skip
+def test_a_place_on_a_load_that_is_a_point_is_refused(part: dict[str, object], field: str) -> None:
+    with pytest.raises(MissionError, match=f"disturbance.0.{field}.*load.kind"):
+        load_mission("hover", {"disturbance": [part]})
 
 
 @pytest.mark.parametrize("law", ["pose", "pose-robust"])

@@ -234,7 +234,10 @@ class Flight:
         same = type(part) is type(before)
         if problems := part.wrong_lengths(self.mission.team.n):
             raise SettingError([Problem(name, "", text) for name, text in problems]).within(section)
-        packed = part.of(leg.drones).params(self._told(section.partition(".")[0]))
+        bound = self._told(section.partition(".")[0])
+        if isinstance(part, DisturbancePart):
+            bound = self._with_real_load(bound, leg.drones)
+        packed = part.of(leg.drones).params(bound)
         if section.startswith("disturbance."):
             if not same:
                 raise ColiftError(f"{section}: only one of the same kind can take its place")
@@ -590,8 +593,8 @@ class Flight:
     def _fresh_memory(self, drones: list[int], start: Start) -> dict[str, Vector]:
         team = self._team(drones)
         memory = {layer: self._memory(layer, self._parts[layer], team) for layer in LAYERS[:-1]}
-        true = self.mission.true_bodies.of(drones)
-        real = replace(team, cable_lengths=true.cable_lengths, body=true.body)
+        lengths = self.mission.true_bodies.of(drones).cable_lengths
+        real = replace(self._with_real_load(team, drones), cable_lengths=lengths)
         return {**memory, "plant": self.mission.plant.initial(real, start)}
 
     def _memory(self, layer: str, part: Part, team: Team) -> Vector:
@@ -628,7 +631,7 @@ class Flight:
                 before = old.circuit.disturbances[place].memory
                 remembered = part.carry_over(before, remembered, places_of(old.drones, drones))
             key = random_key(self.mission.seed, f"disturbance.{number}")
-            packed = part.of(drones).params(team)
+            packed = part.of(drones).params(self._with_real_load(team, drones))
             disturbances.append((type(part), key, packed, remembered))
         params = {layer: self._parts[layer].of(drones).params(team) for layer in LAYERS[:-1]}
         params["plant"] = self.mission.plant.params(self._true_team(drones))
@@ -642,6 +645,10 @@ class Flight:
     def _team(self, drones: list[int]) -> Team:
         """These drones and their load as the controllers are told, hanging as it does on them."""
         return self.membership.outlook.flown(self.mission.team.of(drones))
+
+    def _with_real_load(self, team: Team, drones: list[int]) -> Team:
+        """Such a team of ``drones``, with the load as it really is: forces turn it about that centre of mass."""
+        return replace(team, body=self.mission.true_bodies.of(drones).body)
 
     def _true_team(self, drones: list[int]) -> Team:
         bodies = replace(self.mission.true_bodies.of(drones), load_mass=self._load_mass)

@@ -8,7 +8,7 @@ models alone, before the flight (:func:`losses`) and in it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -163,17 +163,24 @@ def _within(team: Team, parts: Mapping[str, Part], hang: ArrayLike, formation: A
 
 
 def losses(mission: Mission) -> dict[int, Outlook]:
-    """By drone what becomes of a mission whose first team loses it at the start: the hardest moment, as all of the reference is to come."""
+    """By drone what becomes of a mission whose first team loses it: see :func:`lost_one_by_one`."""
+    return {drone: found for drone, _, found in lost_one_by_one(mission)}
+
+
+def lost_one_by_one(mission: Mission) -> Iterator[tuple[int, list[int], Outlook]]:
+    """Each drone of the first team, those that are left without it, and what becomes of them; nobody is left without the only one.
+
+    It is lost at the start: the hardest moment, as all of the reference is to come.
+    """
     drones = mission.first_drones()
     layers = ("actuation", "allocation", "reference", "position_control", "attitude_control")
     parts = {layer: getattr(mission, layer) for layer in layers}
     directions = mission.start_directions()
-    found = {}
     for place, drone in enumerate(drones):
         rest = [other for other in drones if other != drone]
         if rest:
-            found[drone] = outlook(
+            found = outlook(
                 mission.team.of(rest), bound(parts, rest), np.delete(directions, place, axis=0),
                 0.0, mission.timing.duration,
             )  # fmt: skip
-    return found
+            yield drone, rest, found

@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from colift.control.allocation.base import AllocatorPart
 from colift.errors import ColiftError, MissionError
 from colift.mission.forecast import forecast
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
-from colift.mission.outlook import FEWEST, Outlook, bound, outlook
+from colift.mission.outlook import FEWEST, Outlook, lost_one_by_one
 from colift.study.size import CLOSE, STEPS, Question, are_alike
 from colift.team.geometry import Array
 from colift.team.load import edge_attachments, usual_attachments
@@ -111,7 +110,7 @@ class Rigid:
 
     def __init__(self, question: Question, told: Callable[[], None]):
         self.question, self.told = question, told
-        self.base = self.mission(question.drones or FEWEST if question.only_drones else None)
+        self.base = self.mission(question.drones or (FEWEST if question.only_drones else None))
         load = self.base.load
         assert load.size is not None
         self.size = np.array(load.size)
@@ -209,34 +208,21 @@ class Rigid:
 
 def _losses(mission: Mission) -> Iterator[tuple[int, Outlook, str]]:
     """By drone how those that are left go on, and why they do not, also in the wind; empty where they do."""
-    drones = mission.first_drones()
-    parts = {
-        layer: getattr(mission, layer)
-        for layer in (
-            "actuation",
-            "allocation",
-            "reference",
-            "position_control",
-            "attitude_control",
-        )
-    }
-    start = mission.start_directions()
-    for place, drone in enumerate(drones):
-        rest = [other for other in drones if other != drone]
-        team, those = mission.team.of(rest), bound(parts, rest)
-        along = np.delete(start, place, axis=0)
-        found = outlook(team, those, along, 0.0, mission.timing.duration)
-        reason = found.reason
-        if not reason:
-            actuation, allocation = those["actuation"], those["allocation"]
-            assert isinstance(allocation, AllocatorPart)
-            flown = found.flown(team)
-            directions, _ = allocation.formation(flown)
-            hover = allocation.hover(flown, directions, mission.timing.allocation)
-            blows = [part.of(rest) for part in mission.disturbance]
-            ahead = forecast(flown, hover, actuation.thrust_limits(flown), blows)  # type: ignore[attr-defined]
-            reason = next((said for _, said in ahead.problems(flown, math.inf)), "")
-        yield drone, found, reason
+    if len(only := mission.first_drones()) == 1:
+        yield only[0], Outlook(), "no drone is left"
+    for drone, rest, found in lost_one_by_one(mission):
+        yield drone, found, found.reason or _blown_down(mission, rest, found)
+
+
+def _blown_down(mission: Mission, drones: list[int], hanging: Outlook) -> str:
+    """Why these drones, on which the load is left ``hanging``, do not bear the wind; empty where they do."""
+    team, allocation = hanging.flown(mission.team.of(drones)), mission.allocation.of(drones)
+    directions, _ = allocation.formation(team)
+    hover = allocation.hover(team, directions, mission.timing.allocation)
+    limits = mission.actuation.of(drones).thrust_limits(team)
+    blows = [part.of(drones) for part in mission.disturbance]
+    problems = forecast(team, hover, limits, blows).problems(team, math.inf)
+    return next((said for _, said in problems), "")
 
 
 def _alike(ends: Array, others: Array) -> bool:

@@ -24,14 +24,14 @@ PARAMS = Layout(
     drone={"m": 1},
 )  # fmt: skip
 MEMORY = Layout(
-    team={"changed": 1},
+    team={"changed": 1, "tumbled": 1},
     drone={
         "started": 1, "length": 1, "distance": 1, "speed": 1, "velocity": 3, "expected": 3,
         "cable": 1, "thrust": 1, "still": 1, "ages": 2, "now": 1, "steady": 1, "lack": 3,
         "counts": 1, "reeled": 1,
     }
 )  # fmt: skip
-"""How long ago the team ``changed``, s; 0 where that is no matter any more. Of each drone filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
+"""How long ago the team ``changed``, s, 0 where that is no matter any more, and how long after that the load ``tumbled`` last. Of each drone filtered ``distance``, ``speed``, ``velocity`` and ``expected`` acceleration; for how long the signs of ``cable`` and
 ``thrust`` last; time without anything new (``still``) of tracking and attitude, and their ``ages``; whether the distance
 changes faster than that of a taut cable (``now``), and time in which it did not (``steady``); the acceleration that lacks
 (``lack``), and whether it ``counts`` as wind for the others."""
@@ -41,6 +41,8 @@ BRAKED = 0.8
 """Speed over its filtered value below which the ends of a cable are stopped: it has come taut, and is not cut."""
 SOON, GRACE = 1e-9, 4.0
 """Just after a change of the team, and how long a rigid load takes to hang anew, s."""
+TUMBLES, CALM, LONGEST = 2.0, 1.0, 4.0
+"""Turn of the load, rad/s, from which on it does not hang yet; time since then until it does, s; most that both make of the grace."""
 LEAST_UP = 0.5
 """Least vertical part of the axis by which a drone alone judges its thrust."""
 
@@ -62,6 +64,20 @@ def _lacking(i, axis, windy, across, along, memory):  # type: ignore[no-untyped-
     return axis[0] * (x - wx) + axis[1] * (y - wy) + axis[2] * z
 
 
+@inline
+def _turning(n, ends):  # type: ignore[no-untyped-def]
+    """How fast the ends on the load turn about the first of them, rad/s."""
+    fastest = 0.0
+    for i in range(1, n):
+        apart = speed = 0.0
+        for k in range(3):
+            apart += (ends[i, 0, k] - ends[0, 0, k]) ** 2
+            speed += (ends[i, 1, k] - ends[0, 1, k]) ** 2
+        if apart > 0.0:
+            fastest = max(fastest, speed / apart)
+    return math.sqrt(fastest)
+
+
 @kernel(SIGNATURE)
 def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
@@ -79,8 +95,12 @@ def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     keep = decay(dt, params[P.filter])
     if memory[M.changed] > 0.0:
         memory[M.changed] += dt
-        if memory[M.changed] > params[P.grace]:
-            memory[M.changed] = 0.0
+        since, grace = memory[M.changed], params[P.grace]
+        if _turning(n, ends) > TUMBLES:
+            memory[M.tumbled] = since
+        hangs = memory[M.tumbled] == 0.0 or since > memory[M.tumbled] + CALM
+        if since > LONGEST * grace or (since > grace and hangs):
+            memory[M.changed] = memory[M.tumbled] = 0.0
     settles = memory[M.changed] > 0.0
     moving = windy = across = along = 0.0
     for i in range(n):
@@ -213,12 +233,12 @@ class Residuals(DetectionPart):
     """Time for which thrust must lack on a cable that stays taut, s."""
 
     grace: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
-    """Time after a change of the team for which neither cables nor thrusts are judged, s. None: 4 with a rigid load, whose cables go slack and
-    come taut until it hangs on those that are left; else none."""
+    """Time after a change of the team for which neither cables nor thrusts are judged, s; while the load tumbles up to four times as long. None: 4 with a
+    rigid load, whose cables go slack and come taut until it hangs on those that are left; else none."""
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         kept = super().carry_over(old, fresh, places)
-        MEMORY.view(kept, "changed")[:] = SOON
+        MEMORY.view(kept, "changed")[:], MEMORY.view(kept, "tumbled")[:] = SOON, 0.0
         return kept
 
     def grace_of(self, team: Team) -> float:

@@ -83,9 +83,8 @@ class PoseRobust(Pose):
     """Moment per angle within the layer, over weight and half the largest edge of the load, as stiff as the cables hold it themselves."""
     robust_integral: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     """Moment per angle and second of its integral there, 1/s, likewise; ``most_moment`` bounds it."""
-
     yaw: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
-    """Share of that gain about the load's upright axis: tensions turn nothing about it, only cables that have turned, which takes longer."""
+    """Share of ``robust`` about the load's upright axis: tensions turn nothing about it, only cables that have turned, which takes longer."""
 
     def params(self, team: Team) -> Vector:
         kind, axis = spanned(team)

@@ -24,6 +24,13 @@ def arm_of(point: ArrayLike | None, team: Team) -> Vector:
     return np.asarray(np.asarray(point, dtype=float) - team.body.centre)
 
 
+def aside(name: str, point: ArrayLike | None, team: Team) -> list[tuple[str, str]]:
+    """A problem where a place on the load is given, and it is a point."""
+    if team.body is not None or point is None or not np.any(point):
+        return []
+    return [(name, 'is for rigid loads (load.kind = "rigid"): a point has one place')]
+
+
 @inline
 def turn_by(o, params, fx, fy, fz, sees, writes):  # type: ignore[no-untyped-def]
     """Add the moment of a force (N, world) at the end of the arm that stands at ``params[o]``, in the load's frame."""

@@ -17,7 +17,7 @@ from colift.part import Vector
 from colift.team import Team
 from colift.team.scaling import PAPER_LOAD
 from colift.team.vehicles import PAPER_MASS
-from colift.world.disturbance._lever import Metre, arm_of, turn_by
+from colift.world.disturbance._lever import Metre, arm_of, aside, turn_by
 from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Area = Annotated[float, Field(ge=0.0, le=10.0)]
@@ -164,6 +164,9 @@ class Drag(DisturbancePart):
             "rotor_drag": team.rotor_drags,
             "cable_diameter": np.full(team.n, CABLE_DIAMETER * math.sqrt(heavier)),
         }
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        return super().check(team) or aside("load_centre", self.load_centre, team)
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(

@@ -10,7 +10,7 @@ from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.part import Vector
 from colift.team import Team
-from colift.world.disturbance._lever import Metre, arm_of, turn_by
+from colift.world.disturbance._lever import Metre, arm_of, aside, turn_by
 from colift.world.disturbance.base import SIGNATURE, DisturbancePart
 
 Newton = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -47,6 +47,9 @@ class Push(DisturbancePart):
     """Begin, s."""
     duration: Annotated[float, Field(ge=0.0)] = 1.0
     """s."""
+
+    def check(self, team: Team) -> list[tuple[str, str]]:
+        return super().check(team) or aside("point", self.point, team)
 
     def params(self, team: Team) -> Vector:
         return PARAMS.pack(
