@@ -26,7 +26,7 @@ Imports = Mapping[str, frozenset[str]]
 SAYS = {
     "cli": "the commands, a file each",
     "show": "report, replay, live page",
-    "deploy": "controllers as C",
+    "deploy": "controllers as C, ROS 2 nodes",
     "plan": "a team through obstacles",
     "study": "many flights, and what they tell",
     "flight": "the loop; one mission in the air",

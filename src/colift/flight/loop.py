@@ -102,7 +102,7 @@ _wish, _decide = agents.wish, agents.decide
 
 
 @register_jitable  # plain Python in the plain loop
-def _follow_clock(course, t, rigid, bus):  # type: ignore[no-untyped-def]
+def follow_clock(course, t, rigid, bus):  # type: ignore[no-untyped-def]
     """From derivatives along the reference's clock to those in time; shifted, and leaning where the load is rigid.
 
     Of ``x(c(t))`` the derivatives are ``x' c'``, ``x" c'^2 + x' c"`` and ``x"' c'^3 + 3 x" c' c" + x' c"'``.
@@ -170,7 +170,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             )  # fmt: skip
         _supervise(wires.supervision, k, t, dt)
         _refer(wires.reference, k, bus.clock[0], dt)
-        _follow_clock(wires.reference.writes, t, rigid, bus)
+        follow_clock(wires.reference.writes, t, rigid, bus)
         ends_of(bus.reference, bus.wanted_ends)
         if rigid:
             add_wanted_arms(

@@ -1,0 +1,199 @@
+"""What all nodes share: lifecycle, topics with their quality, the loop that runs one, and how it ends."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from colift.errors import MissingExtraError
+from colift.extras import install
+from colift.mission.mission import Mission
+from colift.record.exchange.messages import filled, nanoseconds
+from colift.record.exchange.topics import NAMESPACE, TOPICS, Quality, Topic
+
+try:
+    import rclpy
+    from rclpy.executors import ExternalShutdownException
+    from rclpy.experimental import EventsExecutor
+    from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+except ImportError as error:
+    raise MissingExtraError(
+        f"colift ros: needs ROS 2's rclpy and its messages ({error}); have a ROS 2 installation in this Python's "
+        f"path, or run: {install('ros')}"
+    ) from None
+
+AGAIN = 0.2
+"""Time after which what nobody answered is said again, s."""
+IDLE = 0.05
+"""Longest time between two looks at what is due, s."""
+
+Decode = Callable[[Any], Any]
+
+
+def message_class(name: str) -> Any:
+    """The class of rclpy's messages of a type such as ``nav_msgs/msg/Odometry``."""
+    package, _, kind = name.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), kind)
+
+
+class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for who does not have it
+    """A node of a team.
+
+    Attributes
+    ----------
+    mission : Mission
+    active : bool
+        Whether it speaks.
+    refused : int
+        Messages that nobody flies by: numbers that are not finite, another frame.
+    late : int
+        Deadlines that a topic it hears has missed.
+
+    """
+
+    says: tuple[str, ...] = ()
+    """Topics (:data:`~colift.record.exchange.topics.TOPICS`) that it publishes."""
+    hears: Mapping[str, Decode] = MappingProxyType({})
+    """Topics that it hears, and how each message is read."""
+
+    def __init__(self, name: str, mission: Mission, *, lock_step: bool) -> None:
+        super().__init__(name, namespace=NAMESPACE)
+        self.mission, self.n, self.lock_step = mission, mission.team.n, lock_step
+        self.period = round(mission.timing.allocation * 1e9)
+        self.active, self.over = False, False
+        self.refused = self.late = 0
+        self._publishers_of: dict[str, list[Any]] = {}
+        self._ears: list[Any] = []
+
+    def on_configure(self, state: Any) -> Any:
+        """Make what the node does anew, and its topics."""
+        self.prepare()
+        for key in self.says:
+            topic = TOPICS[key]
+            made, quality = message_class(topic.type), self._quality(topic)
+            self._publishers_of[key] = [
+                self.create_publisher(made, name, quality) for name in topic.below(self.n)
+            ]
+        for key in self.hears:
+            self._listen(key)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: Any) -> Any:
+        self.active = True
+        self.begin()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: Any) -> Any:
+        self.active = False
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: Any) -> Any:
+        for publishers in self._publishers_of.values():
+            for publisher in publishers:
+                self.destroy_publisher(publisher)
+        for ear in self._ears:
+            self.destroy_subscription(ear)
+        self._publishers_of, self._ears = {}, []
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: Any) -> Any:
+        self.active, self.over = False, True
+        return TransitionCallbackReturn.SUCCESS
+
+    def prepare(self) -> None:
+        """Make what the node does, at its beginning."""
+
+    def begin(self) -> None:
+        """What is to be done on activation."""
+
+    def heard(self, key: str, drone: int, at: int, found: Any) -> None:
+        """A message of a topic, read, of a time (ns); ``drone`` is 0 for topics of the team."""
+
+    def due(self, now: float) -> None:
+        """Look at what is due at a time of the machine's clock, s."""
+
+    def say(self, key: str, fields: Mapping[str, Any], drone: int = 0) -> None:
+        """Publish a message."""
+        made = message_class(TOPICS[key].type)()
+        self._publishers_of[key][drone].publish(filled(made, fields))
+
+    def _quality(self, topic: Topic) -> Any:
+        from rclpy.duration import Duration
+
+        asked, seconds = topic.quality, self._seconds(topic)
+        reliable = asked.reliable or self.lock_step
+        profile = QoSProfile(
+            depth=10 if reliable else 1,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL
+            if asked.latched
+            else DurabilityPolicy.VOLATILE,
+        )
+        if not self.lock_step:  # there time waits for who is late
+            profile = _timed(profile, asked, seconds, Duration)
+        return profile
+
+    def _seconds(self, topic: Topic) -> float:
+        return float(getattr(self.mission.timing, topic.every, 0.0))
+
+    def _listen(self, key: str) -> None:
+        from rclpy.event_handler import SubscriptionEventCallbacks
+
+        topic, decode = TOPICS[key], self.hears[key]
+        made, quality = message_class(topic.type), self._quality(topic)
+
+        def miss(event: Any) -> None:
+            self.late += event.total_count_change
+
+        events = SubscriptionEventCallbacks(
+            deadline=miss if quality.deadline.nanoseconds > 0 and not self.lock_step else None
+        )
+        for drone, name in enumerate(topic.below(self.n)):
+
+            def hear(message: Any, drone: int = drone) -> None:
+                found = decode(message)
+                if found is None:
+                    self.refused += 1
+                elif self.active:
+                    self.heard(key, drone, nanoseconds(message.header.stamp), found)
+
+            self._ears.append(
+                self.create_subscription(made, name, hear, quality, event_callbacks=events)
+            )
+
+
+def _timed(profile: Any, asked: Quality, period: float, duration: Any) -> Any:
+    if asked.deadline:
+        profile.deadline = duration(seconds=asked.deadline * period)
+    if asked.lifespan:
+        profile.lifespan = duration(seconds=asked.lifespan * period)
+    return profile
+
+
+def run(
+    make: Callable[[], TeamNode], *, arguments: Sequence[str] = (), activate: bool = True
+) -> TeamNode:
+    """Make a node and run it until it is over, or somebody ends it: Ctrl-C, SIGTERM, its lifecycle."""
+    rclpy.init(args=["colift", *arguments])
+    node = make()
+    executor = EventsExecutor()  # a message costs it half of what the default one takes
+    executor.add_node(node)
+    try:
+        if activate:
+            node.trigger_configure()
+            node.trigger_activate()
+        while rclpy.ok() and not node.over:
+            executor.spin_once(timeout_sec=IDLE)
+            if node.active:
+                node.due(time.monotonic())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        executor.remove_node(node)
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return node

@@ -1,0 +1,108 @@
+"""The node of the simulator: the mission's world, and the drones in it."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from colift.deploy.ros.nodes.node import AGAIN, TeamNode
+from colift.deploy.ros.nodes.speaking import say_load_side
+from colift.deploy.ros.simulating import Simulating, Takes
+from colift.mission.mission import Mission
+from colift.record.exchange import messages
+from colift.record.exchange.messages import acceleration_of, body_of, setpoint_of, wrench_of
+from colift.record.exchange.topics import LOAD, drone
+
+STATE = ("clock", "load", "drone", "cable")
+
+
+class SimulatorNode(TeamNode):
+    """One period after the other: it says where all are, waits for the answer, and flies on.
+
+    In lock step it waits as long as it takes for who steers, and says again what nobody answered. Otherwise it flies at ``speed`` over real time
+    with what it has.
+    """
+
+    def __init__(self, mission: Mission, takes: Takes, *, speed: float | None = None) -> None:
+        self.takes, self.speed = takes, speed
+        alone = takes == "cables"
+        self.says = (*STATE, "reference", "acceleration", "wrench") if alone else STATE
+        self.hears = {"cable_command": wrench_of}
+        if not alone:
+            self.hears |= {
+                "setpoint": setpoint_of, "reference": body_of, "acceleration": acceleration_of, "wrench": wrench_of,
+            }  # fmt: skip
+        super().__init__("simulator", mission, lock_step=speed is None)
+        self.patience = 1.0 if speed is None else 0.0
+        self._said: dict[str, Any] = {}
+
+    def prepare(self) -> None:
+        self.does = Simulating(self.mission, self.takes)
+        self._setpoints: list[Any] = [None] * self.n
+        self._answered = [-1] * self.n
+        self._begun, self._waits = False, True
+        self._since = self._again = 0.0
+        self._begin_wall = math.inf
+
+    def begin(self) -> None:
+        self._begin_wall = time.monotonic()
+        self._state()
+
+    def heard(self, key: str, drone: int, at: int, found: Any) -> None:
+        does = self.does
+        if key == "cable_command":
+            does.held.hear(drone, at, found[0])
+            if self.takes == "cables":
+                self._answered[drone], self._waits = at, True
+        elif key == "setpoint":
+            self._setpoints[drone], self._answered[drone], self._waits = found, at, True
+        elif key == "wrench":
+            does.asked(*found)
+        else:
+            self._said[key] = found
+            if len(self._said) == 2:
+                does.led(self._said["reference"], self._said["acceleration"])
+        if self.lock_step and self._complete():
+            self._advance()
+
+    def _complete(self) -> bool:
+        return all(at >= self.does.at for at in self._answered)
+
+    def due(self, now: float) -> None:
+        """Fly on where it is time, or nobody answers that is waited for."""
+        complete = self._complete()
+        if not complete and now >= self._again:
+            self._again = now + AGAIN
+            self._state()
+        if not self._begun and not complete:
+            return
+        if self.lock_step:
+            held = self.takes == "cables" and now >= self._since + self.patience * self._waits
+            if complete or held:
+                self._waits = complete
+                self._advance()
+        elif now >= self._begin_wall + 1e-9 * (self.does.at + self.period) / (self.speed or 1.0):
+            self._advance()
+
+    def _advance(self) -> None:
+        if not self._begun:
+            self._begun = True
+            self._begin_wall = time.monotonic() - 1e-9 * self.does.at / (self.speed or 1.0)
+        if self.takes == "setpoints" and None not in self._setpoints:
+            self.does.told(self._setpoints)
+        self.does.advance()
+        self._since, self._again = time.monotonic(), time.monotonic() + AGAIN
+        self.over = self.does.over
+        self._state()
+
+    def _state(self) -> None:
+        does, at = self.does, self.does.at
+        self.say("clock", {"clock": messages.stamp(at)})
+        for i, pull in enumerate(does.cables()):
+            self.say("cable", messages.wrench(at, pull), i)
+        for i, body in enumerate(does.drones()):
+            self.say("drone", messages.odometry(at, drone(i), body), i)
+        self.say("load", messages.odometry(at, LOAD, does.load()))
+        if self.takes == "cables":
+            say_load_side(self, at, does.flight.bus)

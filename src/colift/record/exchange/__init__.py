@@ -1,0 +1,1 @@
+"""Formats in which flights and messages are exchanged with other programs: ROS 2 topics, and bags of them."""
