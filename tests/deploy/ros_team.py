@@ -6,7 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,13 @@ class Together:
         self.world, self.allocator = Simulating(self.mission, takes), Allocating(self.mission)
         self.cascade = Steering(self.mission) if takes == "setpoints" else None
 
-    def fly(self, *, silent: Sequence[float] = (0.0, 0.0)) -> Recording:
-        """Fly the mission; the allocator answers nothing between two times, s."""
+    def fly(self, *, silent: Sequence[float] = (0.0, 0.0), killed: bool = False) -> Recording:
+        """Fly the mission; the allocator answers nothing between two times, s, and is a new one after that where it was ``killed``."""
         world = self.world
         while not world.over:
             at = world.at
+            if killed and at == round(silent[1] * 1e9):
+                self.allocator = Allocating(self.mission)
             side = world
             if self.cascade is not None:
                 side = self.cascade
@@ -104,3 +107,58 @@ class Nodes:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+class Listener:
+    """A node of the test's own, in the same domain: it hears, and calls services."""
+
+    def __init__(self, nodes: Nodes) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=int(nodes.environment["ROS_DOMAIN_ID"]))
+        self.node = Node("listener", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.heard: dict[str, list[Any]] = {}
+
+    def __enter__(self) -> Listener:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def listen(self, name: str, made: Any, quality: Any = 10) -> list[Any]:
+        """All messages of a topic from now on."""
+        found = self.heard[name] = []
+        self.node.create_subscription(made, name, found.append, quality)
+        return found
+
+    def until(self, there: Callable[[], Any]) -> Any:
+        """Spin until something is so, and return it."""
+        end = time.monotonic() + LONGEST
+        while not (found := there()):
+            assert time.monotonic() < end, f"waited in vain; heard {self.heard.keys()}"
+            self.executor.spin_once(timeout_sec=0.05)
+        return found
+
+    def call(self, kind: Any, name: str, **fields: Any) -> Any:
+        """Call a service, once it is there."""
+        client = self.node.create_client(kind, name)
+        self.until(client.service_is_ready)
+        asked = client.call_async(kind.Request(**fields))
+        self.until(asked.done)
+        return asked.result()
+
+    def told(self, node: str) -> Any:
+        """The last diagnostics of a node, as level, message and values; level -1 before the first."""
+        for message in reversed(self.heard["/diagnostics"]):
+            (status,) = message.status
+            if status.name == f"colift: {node}":
+                values = {each.key: each.value for each in status.values}
+                return status.level[0], status.message, values
+        return -1, "", {}

@@ -28,10 +28,11 @@ def test_a_team_flies_by_what_it_hears(mission, takes, off, least):
     assert team.allocator.statuses == {Status.CONVERGED: 800}
 
 
+@pytest.mark.parametrize("killed", [False, True])
 @pytest.mark.parametrize("takes", ["cables", "setpoints"])
-def test_a_silent_allocator_brings_the_load_to_rest_and_it_goes_on_afterwards(takes):
+def test_a_silent_allocator_brings_the_load_to_rest_and_it_goes_on_afterwards(takes, killed):
     team = Together("figure-eight", {"timing.duration": 9.0}, takes)
-    recording = team.fly(silent=(3.0, 6.0))
+    recording = team.fly(silent=(3.0, 6.0), killed=killed)
     side = team.cascade or team.world
     assert side.held.silences == 1
     speed = np.linalg.norm(recording["load"][:, 1], axis=1)
@@ -41,14 +42,15 @@ def test_a_silent_allocator_brings_the_load_to_rest_and_it_goes_on_afterwards(ta
     assert speed[recording.time > 7.5].max() > 0.1
     found = metrics.compute(recording)
     assert found["tracking_max_m"] < 0.035
-    assert found["min_angle_deg"] > 44.0
+    # One that begins anew finds another of the formations that cost the same, within its limit of 30 degrees.
+    assert found["min_angle_deg"] > (37.0 if killed else 44.0)
 
 
 def test_the_clock_of_the_reference_is_held_by_silence_alone():
     pace = np.array([0.0, 0.0, 1.0, 1.0, 0.0])
     period = 10_000_000
     late = SILENT * period
-    held = Held(pace, np.ones(2), np.tile([0.0, 0.0, -1.0], (2, 1)), period, now=-1)
+    held = Held(pace, np.ones(2), np.tile([0.0, 0.0, -1.0], (2, 1)), period)
     force = np.array([0.0, 0.0, 3.0])
     assert held.hear(0, 0, force)
     assert held.hear(1, 0, force)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +27,19 @@ class Allocating(Layers):
     ----------
     statuses : Counter
         How often each status was answered.
-    info : (7,) array
-        What the allocator says of its last answer.
+    last : int
+        Time of the last answer, ns; -1 before the first.
+    last_status : Status
+    longest : float
+        The longest call, s.
 
     """
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(mission)
         self.statuses: Counter[Status] = Counter()
-        self.last = -1
+        self.zero = 0
+        self.last, self.last_status, self.longest = -1, Status.CONVERGED, 0.0
 
     @property
     def info(self) -> Array:
@@ -72,8 +77,12 @@ class Allocating(Layers):
         """Forces (n, 3) of the cables on the load, N, for a wanted force and moment at a time (ns)."""
         bus = self.bus
         bus.force[:], bus.moment[:] = force, moment
-        since = self.period if self.last < 0 else at - self.last
-        dt = 1e-9 * min(max(since, 1), LONGEST * self.period)
-        self.statuses[Status(self.call("allocation", at, dt))] += 1
+        if self.last < 0:
+            self.zero, self.last = at, at - self.period
+        dt = 1e-9 * min(max(at - self.last, 1), LONGEST * self.period)
+        begin = perf_counter()
+        self.last_status = Status(self.call("allocation", at - self.zero, dt))
+        self.longest = max(self.longest, perf_counter() - begin)
+        self.statuses[self.last_status] += 1
         self.last = at
         return np.asarray(-bus.desired_tensions[:, None] * bus.desired_directions)

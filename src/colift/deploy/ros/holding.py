@@ -25,23 +25,23 @@ class Held:
     Attributes
     ----------
     tensions, directions : (n,) array, N, and (n, 3) array
+    since : (n,) array
+        Times of what they have, ns; -1 before the first word.
     silent : bool
     silences : int
         How often it was.
 
     """
 
-    def __init__(
-        self, pace: Array, tensions: Array, directions: Array, period: int, *, now: int = 0
-    ) -> None:
+    def __init__(self, pace: Array, tensions: Array, directions: Array, period: int) -> None:
         self.tensions, self.directions = tensions.copy(), directions.copy()
-        self.since = np.full(len(tensions), now, dtype=np.int64)
+        self.since = np.full(len(tensions), -1, dtype=np.int64)
         self.silent, self.silences = False, 0
         self._pace, self._limit = pace, SILENT * period
 
     def hear(self, drone: int, at: int, force: Array) -> bool:
         """A drone gets the force of its cable on the load (3,), N, of a time (ns); whether it is news."""
-        if at <= self.since[drone] and self.since[drone] > 0:
+        if at <= self.since[drone]:
             return False
         one = slice(drone, drone + 1)
         self.tensions[one], self.directions[one] = shares([force], self.directions[one])

@@ -18,6 +18,9 @@ from colift.record.exchange.messages import Body, Setpoint
 Array = NDArray[np.float64]
 
 
+CALLED = ("supervision", "reference", "load_control", "observation", "position_control")
+
+
 class Steering(Layers):
     """Reference, load control, observation and position control of a mission, called as :mod:`colift.flight.loop` does."""
 
@@ -30,10 +33,14 @@ class Steering(Layers):
         super().__init__(mission)
         bus = self.bus
         bus.force[:] = [0.0, 0.0, self.team.load_mass * self.team.gravity]
-        self.held = Held(
-            bus.pace, bus.received_tensions, bus.received_directions, self.period, now=-1
-        )
+        self.held = Held(bus.pace, bus.received_tensions, bus.received_directions, self.period)
+        self._fresh = {layer: getattr(self.flight.wires, layer).memory.copy() for layer in CALLED}
         self._rigid = is_rigid(bus.attachments)
+
+    def again(self) -> None:
+        """Forget what was: nothing is learned before the flight begins."""
+        for layer, memory in self._fresh.items():
+            getattr(self.flight.wires, layer).memory[:] = memory
 
     def lead(self, at: int, load: Body, drones: Sequence[Body]) -> None:
         """Reference, wanted force and moment at a time (ns), where load and drones are there; on the bus."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import time
 from types import MappingProxyType
 from typing import Any
 
+from colift.control.allocation.base import INFO_BALANCE, INFO_ITERATIONS
 from colift.deploy.ros.allocating import Allocating
+from colift.deploy.ros.nodes.diagnosing import OK, STALE, WARN, Condition
 from colift.deploy.ros.nodes.node import TeamNode
 from colift.mission.mission import Mission
 from colift.record.exchange.messages import acceleration_of, body_of, wrench, wrench_of
+
+QUIET = 1.0
+"""Time without a question after which it says so, s."""
 
 
 class AllocatorNode(TeamNode):
@@ -18,6 +25,8 @@ class AllocatorNode(TeamNode):
     hears = MappingProxyType({
         "load": body_of, "drone": body_of, "reference": body_of, "acceleration": acceleration_of, "wrench": wrench_of,
     })  # fmt: skip
+
+    sections = ("allocation",)
 
     def __init__(self, mission: Mission, *, lock_step: bool) -> None:
         super().__init__("allocator", mission, lock_step=lock_step)
@@ -41,9 +50,24 @@ class AllocatorNode(TeamNode):
 
     def begin(self) -> None:
         self.does.last = -1
+        self._asked = -math.inf
+
+    def condition(self) -> Condition:
+        does = self.does
+        counts = {f"status {s.name}": count for s, count in sorted(does.statuses.items())}
+        values = {
+            **counts, "iterations": int(does.info[INFO_ITERATIONS]), "force residual, N": f"{does.info[INFO_BALANCE]:.3g}",
+            "longest call, ms": f"{1e3 * does.longest:.3g}",
+        }  # fmt: skip
+        if time.monotonic() - self._asked > QUIET:
+            return Condition(STALE, "nobody asks", values)
+        if does.last_status.ok:
+            return Condition(OK, "", values)
+        return Condition(WARN, does.last_status.name.lower().replace("_", " "), values)
 
     def _answer(self, at: int, force: Any, moment: Any) -> None:
         does = self.does
+        self._asked = time.monotonic()
         if at != does.last:
             if does.last < 0 or at < does.last:  # the first one, or a flight that begins anew
                 does.last = -1

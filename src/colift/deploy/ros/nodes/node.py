@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from colift.deploy.ros.parameters import Parameters
 from colift.errors import MissingExtraError
 from colift.extras import install
 from colift.mission.mission import Mission
@@ -16,10 +17,15 @@ from colift.record.exchange.topics import NAMESPACE, TOPICS, Quality, Topic
 
 try:
     import rclpy
+    from rcl_interfaces.msg import SetParametersResult
     from rclpy.executors import ExternalShutdownException
     from rclpy.experimental import EventsExecutor
     from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+    from rclpy.parameter import Parameter
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+    from colift.deploy.ros.nodes.declaring import declare
+    from colift.deploy.ros.nodes.diagnosing import OK, Condition, Diagnostics
 except ImportError as error:
     raise MissingExtraError(
         f"colift ros: needs ROS 2's rclpy and its messages ({error}); have a ROS 2 installation in this Python's "
@@ -46,12 +52,16 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
     Attributes
     ----------
     mission : Mission
+    parameters : Parameters
+        Its parts' settings, as they are now.
     active : bool
         Whether it speaks.
     refused : int
         Messages that nobody flies by: numbers that are not finite, another frame.
     late : int
         Deadlines that a topic it hears has missed.
+    zero : int
+        Stamp of the mission's beginning, ns: 0 where time is simulated.
 
     """
 
@@ -60,18 +70,35 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
     hears: Mapping[str, Decode] = MappingProxyType({})
     """Topics that it hears, and how each message is read."""
 
+    hears_time = True
+    """Whether its clock is the simulated one in lock step."""
+    sections: tuple[str, ...] = ()
+    """Sections of the mission whose settings are its parameters."""
+
     def __init__(self, name: str, mission: Mission, *, lock_step: bool) -> None:
-        super().__init__(name, namespace=NAMESPACE)
+        told = [Parameter("use_sim_time", value=True)] if lock_step and self.hears_time else []
+        super().__init__(name, namespace=NAMESPACE, parameter_overrides=told)
         self.mission, self.n, self.lock_step = mission, mission.team.n, lock_step
+        self.does: Any = None
         self.period = round(mission.timing.allocation * 1e9)
         self.active, self.over = False, False
-        self.refused = self.late = 0
+        self.refused = self.late = self.zero = 0
         self._publishers_of: dict[str, list[Any]] = {}
         self._ears: list[Any] = []
+        self.parameters = Parameters({s: getattr(mission, s) for s in self.sections}, mission.team)
+        self.add_on_set_parameters_callback(self._set)
+        declare(self, self.parameters.settings())
+        self._diagnostics = Diagnostics(self)
+
+    def _set(self, parameters: Sequence[Any]) -> Any:
+        flight = None if self.does is None else self.does.flight
+        why = self.parameters.change({each.name: each.value for each in parameters}, flight)
+        return SetParametersResult(successful=not why, reason=why)
 
     def on_configure(self, state: Any) -> Any:
         """Make what the node does anew, and its topics."""
         self.prepare()
+        self.parameters.put(self.does.flight, self.sections)
         for key in self.says:
             topic = TOPICS[key]
             made, quality = message_class(topic.type), self._quality(topic)
@@ -105,7 +132,7 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
         return TransitionCallbackReturn.SUCCESS
 
     def prepare(self) -> None:
-        """Make what the node does, at its beginning."""
+        """Make what the node does (``does``), at its beginning."""
 
     def begin(self) -> None:
         """What is to be done on activation."""
@@ -115,6 +142,16 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
 
     def due(self, now: float) -> None:
         """Look at what is due at a time of the machine's clock, s."""
+
+    def condition(self) -> Condition:
+        """How it is."""
+        return Condition(OK, "")
+
+    def look(self, now: float) -> None:
+        """What is due, also of the diagnostics; an inactive node tells no more than that."""
+        if self.active:
+            self.due(now)
+        self._diagnostics.due(now)
 
     def say(self, key: str, fields: Mapping[str, Any], drone: int = 0) -> None:
         """Publish a message."""
@@ -159,7 +196,7 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
                 if found is None:
                     self.refused += 1
                 elif self.active:
-                    self.heard(key, drone, nanoseconds(message.header.stamp), found)
+                    self.heard(key, drone, nanoseconds(message.header.stamp) - self.zero, found)
 
             self._ears.append(
                 self.create_subscription(made, name, hear, quality, event_callbacks=events)
@@ -188,8 +225,7 @@ def run(
             node.trigger_activate()
         while rclpy.ok() and not node.over:
             executor.spin_once(timeout_sec=IDLE)
-            if node.active:
-                node.due(time.monotonic())
+            node.look(time.monotonic())
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

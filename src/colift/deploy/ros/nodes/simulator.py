@@ -6,6 +6,8 @@ import math
 import time
 from typing import Any
 
+from colift.deploy.ros.holding import SILENT
+from colift.deploy.ros.nodes.diagnosing import ERROR, OK, WARN, Condition
 from colift.deploy.ros.nodes.node import AGAIN, TeamNode
 from colift.deploy.ros.nodes.speaking import say_load_side
 from colift.deploy.ros.simulating import Simulating, Takes
@@ -14,6 +16,8 @@ from colift.record.exchange import messages
 from colift.record.exchange.messages import acceleration_of, body_of, setpoint_of, wrench_of
 from colift.record.exchange.topics import LOAD, drone
 
+LATE = 2.0
+"""Time without a step after which it says so, s."""
 STATE = ("clock", "load", "drone", "cable")
 
 
@@ -24,6 +28,8 @@ class SimulatorNode(TeamNode):
     with what it has.
     """
 
+    hears_time = False
+
     def __init__(self, mission: Mission, takes: Takes, *, speed: float | None = None) -> None:
         self.takes, self.speed = takes, speed
         alone = takes == "cables"
@@ -33,6 +39,10 @@ class SimulatorNode(TeamNode):
             self.hears |= {
                 "setpoint": setpoint_of, "reference": body_of, "acceleration": acceleration_of, "wrench": wrench_of,
             }  # fmt: skip
+        self.sections = (
+            "attitude_control",
+            *(("load_control", "position_control", "observation") if alone else ()),
+        )
         super().__init__("simulator", mission, lock_step=speed is None)
         self.patience = 1.0 if speed is None else 0.0
         self._said: dict[str, Any] = {}
@@ -43,10 +53,10 @@ class SimulatorNode(TeamNode):
         self._answered = [-1] * self.n
         self._begun, self._waits = False, True
         self._since = self._again = 0.0
-        self._begin_wall = math.inf
+        self._paced_from = self._began = math.inf
 
     def begin(self) -> None:
-        self._begin_wall = time.monotonic()
+        self._paced_from = time.monotonic() - 1e-9 * self.does.at / (self.speed or 1.0)
         self._state()
 
     def heard(self, key: str, drone: int, at: int, found: Any) -> None:
@@ -66,6 +76,31 @@ class SimulatorNode(TeamNode):
         if self.lock_step and self._complete():
             self._advance()
 
+    def condition(self) -> Condition:
+        does, now = self.does, time.monotonic()
+        flown, held = 1e-9 * does.at, does.held
+        values = {
+            "simulated, s": f"{flown:.2f}",
+            "over real time": f"{flown / max(now - self._began, 1e-3):.2f}",
+            "silences of the allocator": held.silences,
+            "steered until, s": f"{1e-9 * min(self._answered):.2f}",
+        }
+        if does.flight.outcome != "completed":
+            return Condition(ERROR, does.flight.outcome, values)
+        if not self._begun:
+            return Condition(WARN, "waits for who steers", values)
+        if held.silent and self.takes == "cables":
+            return Condition(
+                ERROR,
+                "the allocator is silent: forces are held, the load is brought to rest",
+                values,
+            )
+        if does.at - min(self._answered) > SILENT * self.period or now > self._since + LATE:
+            return Condition(
+                ERROR, f"nobody steers since {1e-9 * min(self._answered):.2f} s", values
+            )
+        return Condition(OK, "", values)
+
     def _complete(self) -> bool:
         return all(at >= self.does.at for at in self._answered)
 
@@ -82,13 +117,13 @@ class SimulatorNode(TeamNode):
             if complete or held:
                 self._waits = complete
                 self._advance()
-        elif now >= self._begin_wall + 1e-9 * (self.does.at + self.period) / (self.speed or 1.0):
+        elif now >= self._paced_from + 1e-9 * (self.does.at + self.period) / (self.speed or 1.0):
             self._advance()
 
     def _advance(self) -> None:
         if not self._begun:
-            self._begun = True
-            self._begin_wall = time.monotonic() - 1e-9 * self.does.at / (self.speed or 1.0)
+            self._begun, self._began = True, time.monotonic()
+            self._paced_from = self._began
         if self.takes == "setpoints" and None not in self._setpoints:
             self.does.told(self._setpoints)
         self.does.advance()

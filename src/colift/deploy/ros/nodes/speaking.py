@@ -11,6 +11,7 @@ from colift.record.exchange.topics import LOAD
 
 def say_load_side(node: Any, at: int, bus: Any) -> None:
     """Reference and wanted force of a time (ns), from the bus; the question to the allocator comes last."""
+    at += node.zero
     wanted = Body(
         bus.reference[0], bus.reference[1], bus.reference_attitude, bus.reference_rates[0]
     )
