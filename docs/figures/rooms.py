@@ -27,6 +27,7 @@ SAYS = {
     "cli": "the commands, a file each",
     "show": "report, replay, live page",
     "deploy": "controllers as C, ROS 2 nodes",
+    "learn": "environments for learners",
     "plan": "a team through obstacles",
     "study": "many flights, and what they tell",
     "flight": "the loop; one mission in the air",

@@ -19,7 +19,7 @@ from colift.control.allocation.base import AllocatorPart
 from colift.control.reference.base import ReferencePart
 from colift.errors import ColiftError, Problem, SettingError
 from colift.flight.leg import Leg, Stretch, due_rows, places_of
-from colift.flight.loop import CYCLE_WIDTH, Periods, advance, circuit
+from colift.flight.loop import CYCLE_WIDTH, Circuit, Periods, advance, circuit
 from colift.flight.membership import Membership
 from colift.interrupts import heard
 from colift.kernel.math import leaning, winch
@@ -132,6 +132,16 @@ class Flight:
     def wires(self) -> Any:
         """The kernel of each layer with its parameters and memory, by layer (:class:`~colift.flight.loop.Wires`)."""
         return self._legs[-1].circuit.wires
+
+    @property
+    def circuit(self) -> Circuit:
+        """All that the loop calls now."""
+        return self._legs[-1].circuit
+
+    @property
+    def periods(self) -> Periods:
+        """Of the layers."""
+        return self._every
 
     @property
     def drones(self) -> list[int]:
