@@ -58,7 +58,7 @@ TOLD, THROWN = 0.035, 0.16
 """Time after which a touch-down is told, s, and the speed with which the cables' pull may throw the drones up until they are braked, m/s."""
 BRAKE = 5.0
 """Acceleration by which they are braked, m/s^2."""
-GENTLE, BRISK, SLOW = 0.08, 0.12, 0.06
+GENTLE, BRISK, SLOW = 0.08, 0.13, 0.06
 """Least and most speed of a touch-down, m/s, that is as fast as the drones are thrown up, so that no cable catches them; and that where they
 are thrown up faster and will be caught in any case, at this speed, or where there are one or two, which turn widely as they brake."""
 FADE, LEVELLED = 0.3, 3.0
@@ -197,7 +197,7 @@ class Lift(SupervisionPart, Delays):
     speed: Annotated[float, Field(gt=0.0, le=10.0)] = 0.4
     """Most speed of the load on its way to and from the reference, m/s."""
     touch_speed: Annotated[float, Field(gt=0.0, le=0.5)] | None = None
-    """Speed at which it is led onto the ground, m/s. None: 0.08 to 0.12, as fast as the cables' pull throws the drones up until they are
+    """Speed at which it is led onto the ground, m/s. None: 0.08 to 0.13, as fast as the cables' pull throws the drones up until they are
     braked; 0.06 where that is faster than 0.16. A rigid load at most at 0.08: its corners may come first."""
     ground: Annotated[float, Field(ge=-1e6, le=1e6)] = 0.0
     """Height of the ground where the load is set down, m, for a flight that begins in the air; otherwise where it stood."""
