@@ -175,6 +175,20 @@ def numbers(text: str, least: int, most: int) -> list[int]:
     return found
 
 
+def at_times(given: Iterable[str] | None, option: str) -> list[tuple[int, float]]:
+    """Drones and times, s, given as DRONE@TIME."""
+    found = []
+    for text in given or ():
+        drone, _, at = text.partition("@")
+        try:
+            found.append((int(drone), float(at)))
+        except ValueError:
+            raise typer.BadParameter(f"{option} {text}: must be DRONE@TIME, such as 2@4") from None
+        if not (found[-1][0] >= 0 and 0.0 < found[-1][1] < 1e6):
+            raise typer.BadParameter(f"{option} {text}: drones count from 0, times are above 0 s")
+    return found
+
+
 def several(text: str | None) -> list[str]:
     """A list of names, separated by commas."""
     return [name.strip() for name in text.split(",")] if text else []

@@ -76,10 +76,23 @@ def run(
     show_warnings(warnings)
     with progress(f"Flying {loaded.name}") as advance:
         flown = colift.run(loaded, progress=advance)
+    deliver(flown, notes, warnings, folder, report=report, as_json=as_json)
+
+
+def deliver(
+    flown: Run,
+    notes: Iterable[object],
+    warnings: Iterable[object],
+    folder: Path | None,
+    *,
+    report: bool,
+    as_json: bool,
+) -> None:
+    """Write what was flown, say how it went, and end the command with the exit code of its verdict."""
     files: dict[str, Path] = {}
     unwritten = None
     try:
-        write_results(flown, folder or new_folder(loaded.name), report=report, files=files)
+        write_results(flown, folder or new_folder(flown.mission.name), report=report, files=files)
     except OSError as error:  # what was flown is told all the same
         unwritten = error
     if as_json:
@@ -131,9 +144,10 @@ def _say(flown: Run, files: dict[str, Path]) -> None:
     out.print(table)
     show_verdict(flown.verdict)
     simulated = flown.mission.timing.duration
+    pace = simulated / flown.loop_time
     how = "compiled" if flown.compiled else "interpreted, a part is plain Python"
     out.print(
         f"{simulated:g} s of flight in {flown.loop_time:.3f} s ({how}, "
-        f"{simulated / flown.loop_time:.0f} times real time)."
+        f"{round(pace, 0 if pace > 10.0 else 1):g} times real time)."
     )
     show_files(files)

@@ -12,6 +12,7 @@ from colift.cli.base import (
     MissionName,
     Sets,
     app,
+    at_times,
     console,
     emit,
     loading,
@@ -72,7 +73,10 @@ def swarm(
         from colift.flight.swarm import world
         from colift.mission import load_mission
 
-        strokes = [*_strokes(kill, "--kill"), *_strokes(restart, "--restart", again=True)]
+        strokes = [world.Stroke(at, drone) for drone, at in at_times(kill, "--kill")]
+        strokes += [
+            world.Stroke(at, drone, restart=True) for drone, at in at_times(restart, "--restart")
+        ]
         overrides, notes = world.for_agents(mission, parse_overrides(sets))
         loaded = load_mission(mission, overrides)
         for stroke in strokes:
@@ -127,21 +131,6 @@ def _tell(result: dict[str, Any]) -> None:
             else f"within 5 % of the weight after {1e3 * settled:.0f} ms."
         )
         out.print(f"Drone {each['drone']} killed at {each['at']:g} s: {found}", highlight=False)
-
-
-def _strokes(given: list[str] | None, option: str, *, again: bool = False) -> list[Stroke]:
-    from colift.flight.swarm.world import Stroke
-
-    found = []
-    for text in given or ():
-        drone, _, at = text.partition("@")
-        try:
-            found.append(Stroke(at=float(at), drone=int(drone), restart=again))
-        except ValueError:
-            raise typer.BadParameter(f"{option} {text}: must be DRONE@TIME, such as 2@4") from None
-        if not (found[-1].drone >= 0 and 0.0 < found[-1].at < 1e6):
-            raise typer.BadParameter(f"{option} {text}: drones count from 0, times are above 0 s")
-    return found
 
 
 class _Watch:

@@ -205,6 +205,21 @@ class Motors(ActuationPart):
             "noise": NOISE * most,
         }  # fmt: skip
 
+    def together(self, team: Team, motors: Vector) -> tuple[Vector, Vector]:
+        """Thrust (n,) and torques (n, 3) of all motors of each drone, of the thrust of each (n, 4), N: what the mixer inverts.
+
+        Motors are numbered front left, rear left, rear right, front right, x forward and y left.
+        """
+        levers, ratios = self.levers(team), self.settled("torque_ratio", team)
+        arms = np.array([_Y, [-x for x in _X], _SPIN])
+        torques = motors @ arms.T * np.stack([levers, levers, ratios], axis=1)
+        return motors.sum(axis=1), torques
+
+    def levers(self, team: Team) -> Vector:
+        """Distance of each drone's motors from its body axes x and y (n,), m."""
+        arms = self.settled("arm_length", team)
+        return np.where(team.rotors > 4.0, 0.5 * arms, arms / math.sqrt(2.0))
+
     def assumed(self, team: Team) -> dict[str, Vector]:
         own = {field: self.settled(name, team) for field, name in OF_DRONES.items()}
         return own | {"max_thrust": 4.0 * own["max_thrust"]}
@@ -246,10 +261,8 @@ class Motors(ActuationPart):
         kick = [
             each * math.sqrt(1.0 - k * k) for each, k in zip(noises.tolist(), keep, strict=True)
         ]
-        arms = self.settled("arm_length", team)
-        lever = np.where(team.rotors > 4.0, 0.5 * arms, arms / math.sqrt(2.0))
         return PARAMS.pack(
-            team.n, lever=lever, ratio=self.settled("torque_ratio", team), lag=lag,
+            team.n, lever=self.levers(team), ratio=self.settled("torque_ratio", team), lag=lag,
             rate=self.settled("max_rate", team), keep=keep, kick=kick, offset=self.centre_offset,
             least=self.min_thrust, most=self.settled("max_thrust", team),
         )  # fmt: skip
