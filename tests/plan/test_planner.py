@@ -7,26 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from windows import window
 
 from colift.errors import MissionError, PlanError
 from colift.plan import planner
 from colift.plan.distances import CYLINDER, along, distance
 from colift.plan.problem import assemble
-from colift.plan.scene import Scene, load_scene
+from colift.plan.scene import load_scene
 from terminal import colift
-
-
-def window(n=3, gap=0.4):
-    obstacles = np.zeros((2, 8))
-    obstacles[:, 1:4] = [[0.5, s * (0.2 + gap / 2), 0.0] for s in (1, -1)]
-    obstacles[:, 4:7] = [0.2, 0.2, 1.5]
-    ends = np.array([[-0.5, 0.0, 0.0], [1.5, 0.0, 0.0]])
-    return Scene("window", *ends, None, np.full(n, 0.5), obstacles)
-
-
-@pytest.fixture(scope="module")
-def found():
-    return planner.plan(window(), seed=1, attempts=4, seconds=np.inf)
 
 
 def test_a_plan_holds_newtons_equations_of_load_drones_and_cables(found):

@@ -26,6 +26,9 @@ def plan(
     npz: Annotated[
         Path | None, typer.Option("--npz", help="Write the trajectory here, sampled at 1 kHz.")
     ] = None,
+    mission: Annotated[
+        Path | None, typer.Option("--mission", help="Write a mission here that flies it.")
+    ] = None,
     file: JsonFile = None,
     as_json: Json = False,
 ) -> None:
@@ -37,6 +40,7 @@ def plan(
     import numpy as np
 
     with loading():
+        from colift.plan import mission as missions
         from colift.plan import planner
         from colift.plan.scene import load_scene
     found = load_scene(scene)
@@ -51,6 +55,9 @@ def plan(
     if npz is not None:
         planner.save(best, npz)
         result["npz"] = npz
+    if mission is not None:
+        missions.write(best, mission)
+        result["mission"] = mission
     save_json(file, result)
     if as_json:
         emit(result)

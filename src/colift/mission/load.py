@@ -58,7 +58,7 @@ def load_mission(
     elif isinstance(source, str | os.PathLike):
         label, table = read_source(source)
         table = _plain(table)
-        _beside(Path(source), table.get("drones"))
+        _beside(Path(source), table)
     else:
         raise SettingError.of("mission", shown(source), "must be a name, a path or a mapping")
     problems: list[Problem] = []
@@ -158,18 +158,23 @@ def _follow_delay(table: dict[str, Any], before: Any, given: set[str]) -> None:
                 del section[name]
 
 
-def _beside(source: Path, drones: Any) -> None:
-    """Take files of vehicles that a mission's file names from its own folder."""
-    if not isinstance(drones, dict) or not source.is_file():
+def _beside(source: Path, table: Mapping[str, Any]) -> None:
+    """Take files that a mission's file names, of vehicles and of a plan, from its own folder."""
+    if not source.is_file():
         return
-    vehicle = drones.get("vehicle")
 
-    def found(name: Any) -> Any:
-        is_file = isinstance(name, str) and name.endswith(".toml")
+    def found(name: Any, ending: str) -> Any:
+        is_file = isinstance(name, str) and name.endswith(ending)
         return str(source.parent / name) if is_file else name
 
-    if vehicle is not None:
-        drones["vehicle"] = [*map(found, vehicle)] if isinstance(vehicle, list) else found(vehicle)
+    drones, reference = table.get("drones"), table.get("reference")
+    if isinstance(drones, dict) and drones.get("vehicle") is not None:
+        vehicle = drones["vehicle"]
+        several = isinstance(vehicle, list)
+        each = [found(name, ".toml") for name in (vehicle if several else [vehicle])]
+        drones["vehicle"] = each if several else each[0]
+    if isinstance(reference, dict) and reference.get("kind") == "plan":
+        reference |= {"file": found(reference["file"], "")} if "file" in reference else {}
 
 
 def _drop_old_vehicle(table: dict[str, Any], path: str, value: Any, given: set[str]) -> None:

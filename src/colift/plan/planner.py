@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.errors import PlanError
-from colift.plan import guess, splines
+from colift.kernel.math import splines
+from colift.plan import guess
 from colift.plan.problem import KINDS, LIMITS, NEVER, assemble, optimise, sampled
 from colift.plan.scene import Scene
 from colift.record.recording import atomic_path
@@ -143,6 +144,12 @@ class Plan:
     @cached_property
     def intervals(self) -> int:
         return len(self.load_points) - DEGREES[0]
+
+    @property
+    def cable_points(self) -> Numbers:
+        """Control points (K + 5, n, 3) of what each cable's force on the load is beyond an equal share of all, over its weight."""
+        z = self.pull_points.reshape(len(self.pull_points), -1, 3)
+        return np.asarray(np.einsum("il,klc->kic", basis(len(self.scene.lengths)), z))
 
     def sample(self, count: int) -> dict[str, Numbers]:
         """About ``count`` rows of all that the plan says, world frame.
@@ -428,7 +435,7 @@ def save(best: Plan, file: Path) -> Path:
     sampled: dict[str, Any] = best.sample(round(1000.0 * best.duration))
     with atomic_path(file) as temporary, temporary.open("wb") as stream:
         np.savez(
-            stream, duration=best.duration, load_points=best.load_points, pull_points=best.pull_points, cable_lengths=scene.lengths,
+            stream, duration=best.duration, load_points=best.load_points, pull_points=best.cable_points, cable_lengths=scene.lengths,
             obstacles=scene.obstacles, load_mass=limits.load_mass, drone_mass=limits.drone_mass, gravity=limits.gravity, seed=best.seed,
             **sampled,
         )  # fmt: skip

@@ -89,7 +89,7 @@ def _tension_now(i, told, nominal, memory, o):  # type: ignore[no-untyped-def]
 
 @inline
 def nominal_thrust(i, m, g, span, wanted, nominal, thrust):  # type: ignore[no-untyped-def]
-    """What drone i of a rigid load must give where all goes as planned (3,), N."""
+    """What drone i must give where all goes as planned (3,), N."""
     T, T1, T2 = size_of(i, nominal)
     for k in range(3):
         direction, _, turning = course_of(i, k, nominal, T, T1, T2)
@@ -128,6 +128,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             keep_courses(n, kept, memory, M.rows + M.direction, M.width)
         if math.isnan(nominal[0, 0, 0]):
             nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
+    follows = params[P.rigid] > 0.0 or not math.isnan(nominal[0, 0, 0])  # the cables are planned
     planned_now = memory[M.plan : M.plan + 3]
     height = 0.0
     for i in range(n):
@@ -152,7 +153,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
                 for k in range(3):
                     memory[d + 9 + k], memory[d + 12 + k] = T[i] * memory[d + k], 0.0
         pull = T[i]
-        if params[P.rigid] > 0.0:
+        if follows:
             _tension_now(i, T[i], nominal, memory, o)
             pull = memory[o + M.tension]
         short_x -= pull * memory[d]
@@ -175,7 +176,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         span = L + spans[i, 0]
         rate, bend = spans[i, 1] + reeled[i, 1], spans[i, 2] + reeled[i, 2]
         led = not math.isnan(courses[i, 0, 0])
-        tension = memory[o + M.tension] if params[P.rigid] > 0.0 else T[i]
+        tension = memory[o + M.tension] if follows else T[i]
         push = 0.0
         for k in range(3):
             a = o + M.direction + k
@@ -202,9 +203,8 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             known = tension * pull + forces[i, k] + m / params[P.total] * short[k]
             u[i, k] = needed + m * most * u[i, k] - known
         more = 0.0
-        if params[P.rigid] > 0.0:
-            for k in range(3):
-                writes.desired_turning[i, k] = 0.0
+        for k in range(3):
+            writes.desired_turning[i, k] = 0.0
         wind = sees.estimated_wind
         past = (wind[0] - v[i, 0], wind[1] - v[i, 1], wind[2] - v[i, 2])
         ux, uy, uz = rotors.thrust_for(u[i, 0], u[i, 1], u[i, 2], params[p + P.drag], past)
@@ -213,7 +213,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             for k in range(3):
                 u[i, k] = planned[k] = 0.0 if k < 2 else IDLE * m * g
         else:
-            if params[P.rigid] > 0.0 and not led:
+            if follows and not led:
                 nominal_thrust(i, m, g, span, wanted, nominal, planned_now)
                 more = look_ahead(
                     i, memory[o + M.started] == 0.0, dt, keep_plan, params[P.lag], planned_now, memory,
