@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,8 +17,10 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParametersAtomically
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_team import LONGEST, Listener, Nodes
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
 from colift.record import metrics
 from colift.record.recording import Recording
@@ -81,6 +86,43 @@ def test_drones_hold_the_last_forces_when_the_allocator_is_killed_and_go_on_when
     found = metrics.compute(recording)
     assert found["tracking_max_m"] < 0.05
     assert found["min_angle_deg"] > 30.0  # which the mission's allocator promises
+
+
+def test_who_comes_later_gets_the_description_of_the_team(tmp_path):
+    with Nodes(tmp_path) as nodes, Listener(nodes) as listener:
+        listener.listen("/diagnostics", DiagnosticArray)
+        nodes.start("simulator", "hover", "--takes", "cables")
+        listener.until(lambda: listener.told("simulator")[0] == WARN)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        heard = listener.listen("/colift/robot_description", String, latched)
+        listener.until(lambda: heard)
+        assert ElementTree.fromstring(heard[0].data).get("name") == "hover"
+
+
+def test_a_node_that_dies_is_started_again_by_its_launch(tmp_path):
+    with Nodes(tmp_path) as nodes, Listener(nodes) as listener:
+        clock = listener.listen("/clock", Clock)
+        flight = ("figure-eight", "--set", "timing.duration=20")
+        launch = nodes.start("launch", *flight, "--record", "flight.h5")
+        listener.until(lambda: clock and clock[-1].clock.sec >= 1)
+        children = Path(f"/proc/{launch.pid}/task/{launch.pid}/children").read_text().split()
+        (allocator,) = [
+            int(child)
+            for child in children
+            if b"allocator" in Path(f"/proc/{child}/cmdline").read_bytes()
+        ]
+        os.kill(allocator, signal.SIGKILL)
+        assert launch.wait(LONGEST) == 0, nodes.said("launch")
+        assert "allocator ended with -9; it is started again" in nodes.said("launch")
+    assert Recording.load(tmp_path / "flight.h5").time[-1] > 19.9
+
+
+def test_a_launch_of_what_cannot_start_ends(tmp_path):
+    with Nodes(tmp_path) as nodes:
+        wrong = ("--", "--ros-args", "-p", "allocation.mu:=-2.0")
+        launch = nodes.start("launch", "hover", "--takes", "cables", *wrong)
+        assert launch.wait(LONGEST) == 1
+        assert "allocator ended with 1 again and again" in nodes.said("launch")
 
 
 def test_settings_are_parameters_with_ranges_and_changes_are_checked(tmp_path):

@@ -2,81 +2,82 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from colift.cli.base import MissionName, Sets, With, app, load_parts, loading, out, show_notes
+from colift.cli.base import (
+    EXIT_ERROR,
+    MissionName,
+    Sets,
+    With,
+    app,
+    err,
+    load_parts,
+    loading,
+    out,
+    show_notes,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from colift.deploy.ros.nodes.node import TeamNode
     from colift.mission.mission import Mission
 
-Node = Literal["allocator", "cascade", "simulator"]
+Node = Literal["launch", "allocator", "cascade", "simulator"]
+Takes = Literal["cables", "setpoints"]
+
+Period = Annotated[
+    float | None,
+    typer.Option(
+        help="Of what goes over topics, s.", show_default="the mission's, at least 0.01", min=0.001, max=1.0,
+    ),
+]  # fmt: skip
+Told = Annotated[
+    Takes,
+    typer.Option(
+        help="What the simulator's drones are told: their cables' forces, or set-points by the cascade."
+    ),
+]
+Speed = Annotated[
+    float | None,
+    typer.Option(
+        help="Simulated over real time; for all nodes or none.", show_default="lock step", min=0.01, max=100.0,
+    ),
+]  # fmt: skip
+Record = Annotated[
+    Path | None, typer.Option(help="Write the simulator's recording here when it ends.")
+]
+Inactive = Annotated[bool, typer.Option("--inactive", help="Wait to be configured and activated.")]
+Rest = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[-- --ros-args ...]", help="What ROS is told: remappings, parameters."),
+]
 
 
 @app.command()
 def ros(
-    node: Annotated[Node, typer.Argument(help="Which node.")],
+    node: Annotated[Node, typer.Argument(help="Which node; launch starts all of them.")],
     mission: MissionName = "real-world",
-    arguments: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[-- --ros-args ...]", help="What ROS is told: remappings, parameters."
-        ),
-    ] = None,
-    period: Annotated[
-        float | None,
-        typer.Option(
-            help="Of what goes over topics, s.",
-            show_default="the mission's, at least 0.01",
-            min=0.001,
-            max=1.0,
-        ),
-    ] = None,
-    takes: Annotated[
-        Literal["cables", "setpoints"],
-        typer.Option(
-            help="What the simulator's drones are told: their cables' forces, or set-points by the cascade."
-        ),
-    ] = "setpoints",
-    speed: Annotated[
-        float | None,
-        typer.Option(
-            help="Simulated over real time; all nodes must be given it or none.",
-            show_default="lock step",
-            min=0.01,
-            max=100.0,
-        ),
-    ] = None,
-    patience: Annotated[
-        float | None,
-        typer.Option(
-            help="How long the cascade waits for the allocator, s.",
-            show_default="half a period; 1 in lock step",
-            min=0.0,
-            max=10.0,
-        ),
-    ] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Write the simulator's recording here when it ends.")
-    ] = None,
-    inactive: Annotated[
-        bool, typer.Option("--inactive", help="Wait to be configured and activated.")
-    ] = False,
+    arguments: Rest = None,
+    period: Period = None,
+    takes: Told = "setpoints",
+    speed: Speed = None,
+    record: Record = None,
+    inactive: Inactive = False,
     sets: Sets = None,
     extra: With = None,
 ) -> None:
-    """Run a node: the allocator, the cascade of controllers, or the simulator.
+    """Run a mission's controllers and its simulation as ROS 2 nodes: all of them, or one.
 
     All nodes of a team are given the same mission. Needs ROS 2 (extra `ros`). In lock step, which is what they do unless a speed is
     given, the simulated time waits for all of them.
 
     [bold]Examples[/bold]
 
-      colift ros simulator hover --takes cables --record flight.h5
-      colift ros allocator hover
+      colift ros launch figure-eight --record flight.h5
+      colift ros simulator hover --takes cables
       colift ros cascade hover --speed 1 -- --ros-args -r __ns:=/team_1
     """
     from colift.mission.load import parse_overrides
@@ -87,24 +88,52 @@ def ros(
 
         load_parts(extra)
         loaded, notes = mission_for(mission, parse_overrides(sets), period)
+    if node == "launch":
+        given = _given(mission, period, takes, speed, inactive, sets, extra)
+        _launch(given, takes, record, arguments or ())
+        return
     show_notes(notes)
-
-    def make() -> TeamNode:
-        return _made(node, loaded, takes=takes, speed=speed, patience=patience)
-
-    ended = run(make, arguments=arguments or (), activate=not inactive)
+    ended = run(
+        lambda: _made(node, loaded, takes, speed), arguments=arguments or (), activate=not inactive
+    )
     if node == "simulator":
         _tell(ended, record)
 
 
-def _made(
-    node: Node,
-    mission: Mission,
-    *,
-    takes: Literal["cables", "setpoints"],
+def _given(
+    mission: str,
+    period: float | None,
+    takes: Takes,
     speed: float | None,
-    patience: float | None,
-) -> TeamNode:
+    inactive: bool,
+    sets: list[str] | None,
+    extra: list[Path] | None,
+) -> list[str]:
+    """The command's arguments again, for each node."""
+    words = [mission, "--takes", takes, *(["--inactive"] if inactive else [])]
+    for option, value in (("--period", period), ("--speed", speed)):
+        words += [] if value is None else [option, f"{value:.12g}"]
+    for text in sets or ():
+        words += ["--set", text]
+    for path in extra or ():
+        words += ["--with", str(path)]
+    return words
+
+
+def _launch(given: list[str], takes: Takes, record: Path | None, rest: Sequence[str]) -> None:
+    from colift.deploy.ros.launch import FIRST, Launch
+
+    tail = ["--", *rest] if rest else []
+    saved = [] if record is None else ["--record", str(record)]
+    nodes = {
+        name: [*given, *(saved if name == "simulator" else []), *tail] for name in FIRST[takes]
+    }
+    code = Launch(nodes, lambda text: err.print(text, markup=False)).run()
+    if code:
+        raise typer.Exit(EXIT_ERROR)
+
+
+def _made(node: Node, mission: Mission, takes: Takes, speed: float | None) -> TeamNode:
     if node == "simulator":
         from colift.deploy.ros.nodes.simulator import SimulatorNode
 
@@ -112,7 +141,7 @@ def _made(
     if node == "cascade":
         from colift.deploy.ros.nodes.cascade import CascadeNode
 
-        return CascadeNode(mission, lock_step=speed is None, patience=patience)
+        return CascadeNode(mission, lock_step=speed is None)
     from colift.deploy.ros.nodes.allocator import AllocatorNode
 
     return AllocatorNode(mission, lock_step=speed is None)

@@ -70,6 +70,10 @@ class Simulating:
         )  # fmt: skip
         return [Body(*row) for row in rows]
 
+    def ends(self) -> Array:
+        """Ends (n, 3) of the cables on the load, as estimated, m."""
+        return np.asarray(self.flight.bus.estimated_ends[:, 0])
+
     def cables(self) -> Array:
         """Forces (n, 3) of the cables on the load as they are, N."""
         bus = self.flight.bus

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.record.exchange.topics import WORLD
+from colift.record.exchange.topics import LOAD, WORLD, cable, drone
+from colift.team.geometry import zero_yaw_quaternion
 
 Array = NDArray[np.float64]
 Fields = dict[str, Any]
@@ -141,6 +142,29 @@ def setpoint_of(message: Any) -> Setpoint | None:
     if attitude is None or not finite(rates, force):
         return None
     return Setpoint(attitude, rates, float(force[2]))
+
+
+def frames(at: int, load: Body, drones: Sequence[Body], ends: Array) -> list[Fields]:
+    """``geometry_msgs/TransformStamped`` of the frames below the world's; ``ends`` (n, 3) of the cables, m."""
+    poses = {LOAD: (load.position, load.attitude)}
+    poses |= {drone(i): (body.position, body.attitude) for i, body in enumerate(drones)}
+    for i, (body, end) in enumerate(zip(drones, ends, strict=True)):
+        away = body.position - end
+        length = float(np.linalg.norm(away))
+        along = away / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+        turned = (
+            zero_yaw_quaternion(along) if along[2] > -0.999999 else np.array([0.0, 1.0, 0.0, 0.0])
+        )
+        poses[cable(i)] = end, turned
+    return [
+        {
+            "header": _header(at, WORLD),
+            "child_frame_id": name,
+            "transform": {"translation": _vector(place), "rotation": _quaternion(attitude)},
+        }
+        for name, (place, attitude) in poses.items()
+        if finite(place, attitude)
+    ]
 
 
 def filled(message: Any, fields: Mapping[str, Any]) -> Any:

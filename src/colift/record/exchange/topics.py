@@ -86,6 +86,8 @@ TOPICS = {
     "cable_command": Topic("drone_{i}/cable_command", _WRENCH, "allocator", "wanted force of this drone's cable on the load; torque is zero", "N", "world", STREAM, "allocation"),
     "cable": Topic("drone_{i}/cable", _WRENCH, "simulator", "force of this drone's cable on the load as it is; torque is zero", "N", "world", STREAM, "position_control"),
     "setpoint": Topic("drone_{i}/setpoint", "sensor_msgs/msg/Imu", "cascade", "what this drone's inertial sensors should read: attitude, rates, and along z thrust over mass", "1, rad/s, m/s^2", "drone_{i}", STREAM, "position_control"),
+    "tf": Topic("/tf", "tf2_msgs/msg/TFMessage", "simulator", "frames load, drone_{i} and cable_{i}: in the cable's end on the load, z along the cable to the drone", "m", "world", NEWS, "position_control"),
+    "description": Topic("robot_description", "std_msgs/msg/String", "simulator", "URDF of team and load", "-", "-", KEPT, "once"),
     "clock": Topic("/clock", "rosgraph_msgs/msg/Clock", "simulator", "simulated time", "s", "-", STREAM, "position_control"),
 }  # fmt: skip
 """Every topic by a short name of ours."""

@@ -32,10 +32,9 @@ class CascadeNode(TeamNode):
     sections = ("load_control", "position_control", "observation")
     hears = MappingProxyType({"load": body_of, "drone": body_of, "cable_command": wrench_of})
 
-    def __init__(self, mission: Mission, *, lock_step: bool, patience: float | None = None) -> None:
+    def __init__(self, mission: Mission, *, lock_step: bool) -> None:
         super().__init__("cascade", mission, lock_step=lock_step)
-        short = 0.5 * mission.timing.allocation
-        self.patience = patience if patience is not None else 1.0 if lock_step else short
+        self.be_patient(1.0 if lock_step else 0.5 * mission.timing.allocation)
 
     def prepare(self) -> None:
         self.does = Steering(self.mission)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from colift.deploy.ros.parameters import Parameters
+from colift.deploy.ros.parameters import Parameters, Setting
 from colift.errors import MissingExtraError
 from colift.extras import install
 from colift.mission.mission import Mission
@@ -28,8 +29,8 @@ try:
     from colift.deploy.ros.nodes.diagnosing import OK, Condition, Diagnostics
 except ImportError as error:
     raise MissingExtraError(
-        f"colift ros: needs ROS 2's rclpy and its messages ({error}); have a ROS 2 installation in this Python's "
-        f"path, or run: {install('ros')}"
+        f"colift ros: needs ROS 2's rclpy and its messages, the extra ros ({error}); have a ROS 2 installation in "
+        f"this Python's path, or run: {install('ros')}"
     ) from None
 
 AGAIN = 0.2
@@ -40,6 +41,7 @@ IDLE = 0.05
 Decode = Callable[[Any], Any]
 
 
+@cache
 def message_class(name: str) -> Any:
     """The class of rclpy's messages of a type such as ``nav_msgs/msg/Odometry``."""
     package, _, kind = name.split("/")
@@ -95,15 +97,31 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
         why = self.parameters.change({each.name: each.value for each in parameters}, flight)
         return SetParametersResult(successful=not why, reason=why)
 
+    def be_patient(self, seconds: float) -> None:
+        """Have the parameter ``patience``."""
+        words = "how long the allocator's answer is waited for in each cycle, s"
+        declare(self, [Setting("patience", seconds, words, 0.0, 10.0, False, ">= 0, <= 10", True)])
+
+    @property
+    def patience(self) -> float:
+        """How long the allocator's answer is waited for in each cycle, s."""
+        return float(self.get_parameter("patience").value)
+
     def on_configure(self, state: Any) -> Any:
         """Make what the node does anew, and its topics."""
         self.prepare()
         self.parameters.put(self.does.flight, self.sections)
         for key in self.says:
             topic = TOPICS[key]
-            made, quality = message_class(topic.type), self._quality(topic)
+            try:
+                made = message_class(topic.type)
+            except ModuleNotFoundError as error:  # tf2_msgs comes with ROS, but not with its wheels
+                self.get_logger().warning(f"{topic.name} is not published: {error}")
+                self._publishers_of[key] = []
+                continue
             self._publishers_of[key] = [
-                self.create_publisher(made, name, quality) for name in topic.below(self.n)
+                self.create_publisher(made, name, self._quality(topic))
+                for name in topic.below(self.n)
             ]
         for key in self.hears:
             self._listen(key)
@@ -154,9 +172,16 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
         self._diagnostics.due(now)
 
     def say(self, key: str, fields: Mapping[str, Any], drone: int = 0) -> None:
-        """Publish a message."""
-        made = message_class(TOPICS[key].type)()
-        self._publishers_of[key][drone].publish(filled(made, fields))
+        """Publish a message, where anybody hears it or may come to hear it."""
+        topic = TOPICS[key]
+        if topic.quality.latched or self.is_heard(key, drone):
+            made = message_class(topic.type)()
+            self._publishers_of[key][drone].publish(filled(made, fields))
+
+    def is_heard(self, key: str, drone: int = 0) -> bool:
+        """Whether anybody hears a topic."""
+        publishers = self._publishers_of[key]
+        return bool(publishers) and publishers[drone].get_subscription_count() > 0
 
     def _quality(self, topic: Topic) -> Any:
         from rclpy.duration import Duration

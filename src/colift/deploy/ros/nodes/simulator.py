@@ -6,6 +6,8 @@ import math
 import time
 from typing import Any
 
+from geometry_msgs.msg import TransformStamped
+
 from colift.deploy.ros.holding import SILENT
 from colift.deploy.ros.nodes.diagnosing import ERROR, OK, WARN, Condition
 from colift.deploy.ros.nodes.node import AGAIN, TeamNode
@@ -13,12 +15,19 @@ from colift.deploy.ros.nodes.speaking import say_load_side
 from colift.deploy.ros.simulating import Simulating, Takes
 from colift.mission.mission import Mission
 from colift.record.exchange import messages
-from colift.record.exchange.messages import acceleration_of, body_of, setpoint_of, wrench_of
+from colift.record.exchange.messages import (
+    acceleration_of,
+    body_of,
+    filled,
+    setpoint_of,
+    wrench_of,
+)
 from colift.record.exchange.topics import LOAD, drone
+from colift.record.exchange.urdf import urdf
 
 LATE = 2.0
 """Time without a step after which it says so, s."""
-STATE = ("clock", "load", "drone", "cable")
+STATE = ("clock", "tf", "description", "load", "drone", "cable")
 
 
 class SimulatorNode(TeamNode):
@@ -44,7 +53,8 @@ class SimulatorNode(TeamNode):
             *(("load_control", "position_control", "observation") if alone else ()),
         )
         super().__init__("simulator", mission, lock_step=speed is None)
-        self.patience = 1.0 if speed is None else 0.0
+        if self.lock_step and alone:
+            self.be_patient(1.0)
         self._said: dict[str, Any] = {}
 
     def prepare(self) -> None:
@@ -56,6 +66,7 @@ class SimulatorNode(TeamNode):
         self._paced_from = self._began = math.inf
 
     def begin(self) -> None:
+        self.say("description", {"data": urdf(self.mission.team, self.mission.name)})
         self._paced_from = time.monotonic() - 1e-9 * self.does.at / (self.speed or 1.0)
         self._state()
 
@@ -136,8 +147,12 @@ class SimulatorNode(TeamNode):
         self.say("clock", {"clock": messages.stamp(at)})
         for i, pull in enumerate(does.cables()):
             self.say("cable", messages.wrench(at, pull), i)
-        for i, body in enumerate(does.drones()):
+        load, drones = does.load(), does.drones()
+        for i, body in enumerate(drones):
             self.say("drone", messages.odometry(at, drone(i), body), i)
-        self.say("load", messages.odometry(at, LOAD, does.load()))
+        self.say("load", messages.odometry(at, LOAD, load))
+        if self.is_heard("tf"):
+            framed = messages.frames(at, load, drones, does.ends())
+            self.say("tf", {"transforms": [filled(TransformStamped(), each) for each in framed]})
         if self.takes == "cables":
             say_load_side(self, at, does.flight.bus)
