@@ -24,6 +24,7 @@ FLIGHT = ("colift.flight.loop", "colift.control.reference.descent")
 """Modules with kernels that any flight may call."""
 STUDIES = (
     "colift.study.bench.timing", "colift.study.latency", "colift.study.rehearsal", "colift.study.safety", "colift.plan.planner",
+    "colift.learn.kernels",
 )  # fmt: skip
 """Modules with kernels that no flight calls, but a study."""
 LONGEST = (("allocation", "safe"), ("supervision", "lift"))

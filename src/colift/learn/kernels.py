@@ -56,6 +56,8 @@ TURNS = (6.0, 6.0, 2.0)
 """Largest rates that are asked for, body axes, rad/s."""
 LIMIT = 1e3
 """Observations are clipped to this."""
+FASTEST = 10.0
+"""No speed counts for more, m/s."""
 _X, _Y, _SPIN = (1.0, -1.0, -1.0, 1.0), (1.0, 1.0, -1.0, -1.0), (1.0, -1.0, 1.0, -1.0)
 """Where motors stand and how they turn their drone, as in :mod:`colift.world.actuation.motors`."""
 
@@ -209,7 +211,9 @@ def judge(action, numbers, eyes):  # type: ignore[no-untyped-def]
             over = NO_NUMBERS
     if over == NO_NUMBERS:
         return numbers[N.over], over
-    reward = numbers[N.near] * math.exp(-off / numbers[N.scale]) - numbers[N.slow] * fast
+    reward = numbers[N.near] * math.exp(-off / numbers[N.scale]) - numbers[N.slow] * min(
+        fast, FASTEST
+    )
     reward += level - numbers[N.effort] * effort / action.shape[0]
     return (reward + numbers[N.over] if over else reward), over
 

@@ -26,7 +26,7 @@ _IDLE = {"allocation.kind": _EXTERNAL, "load_control.kind": _EXTERNAL, "observat
 
 LEVELS = {
     "cables": Level(
-        CABLES, 3, "the pull of its cable on the load, world, by up to half of the load's weight over the number of drones",
+        CABLES, 3, "the pull of its cable on the load, world, by up to half of the drone's share of the load's weight",
         {"allocation.kind": _EXTERNAL},
     ),
     "forces": Level(
@@ -45,7 +45,7 @@ LEVELS = {
 """By name."""
 
 OBSERVATIONS = {"central": CENTRAL, "drone": DRONE, "part": PART}
-"""All numbers in one vector; a row for each drone of what it sees; what an allocator sees, for the level ``cables`` only."""
+"""All numbers in one vector; a row for each drone of what it sees; what an allocator sees, for the level ``cables``."""
 
 
 def driven(level: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 TERMS = {
     "near": "exp(-e / 0.25 m), e the distance of the load from where it is wanted",
     "level": "exp(-2 a), a the angle of a rigid load from its wanted attitude, rad",
-    "slow": "minus the difference from the wanted velocity, m/s",
+    "slow": "minus the difference from the wanted velocity, m/s, 10 at most",
     "effort": "minus the mean square of the action",
     "over": "once, where the episode ends before its time",
 }
@@ -52,6 +52,8 @@ class Task:
     weights : mapping of :data:`TERMS` to float
     reach, least_height : float
         See :data:`ENDS`.
+    rigid : mapping
+        What else a rigid load changes of the mission, by path.
     boxes : (m, 6) array
         Obstacles: centres and half edges, m.
     gap : (3,) array
@@ -67,6 +69,7 @@ class Task:
     )  # fmt: skip
     reach: float = 1.0
     least_height: float = 0.2
+    rigid: Mapping[str, Any] = field(default_factory=dict)
     boxes: Array = field(default_factory=lambda: np.zeros((0, 6)))
     gap: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -92,11 +95,70 @@ def _mission(
     }  # fmt: skip
 
 
+def _wall(x: float, opening: tuple[float, float, float, float]) -> Array:
+    """A wall across the way at ``x``, 0.1 m thick, 8 m wide and 5 m high, with an opening: y and z from and to, m."""
+    left, right, low, high = opening
+    edges = [
+        (-4.0, left, 0.0, 5.0),
+        (right, 4.0, 0.0, 5.0),
+        (left, right, 0.0, low),
+        (left, right, high, 5.0),
+    ]
+    return np.array(
+        [
+            [x, 0.5 * (a + b), 0.5 * (c + d), 0.05, 0.5 * (b - a), 0.5 * (d - c)]
+            for a, b, c, d in edges
+        ]
+    )
+
+
+def _lift(low: float) -> tuple[tuple[float, float, float], ...]:
+    """Up from the ground, across and down again."""
+    return ((0.0, 0.0, low), (0.0, 0.0, 1.0), (1.5, 0.0, 1.0), (1.5, 0.0, low))
+
+
 TASKS = {
     "Hover": Task(
         "Hold the load still; it begins up to 0.3 m away.",
         _mission("hover", 5.0, {"kind": "hover", "position": [0.0, 0.0, 1.5]}),
         {**TOLD_WRONG, **START},
     ),
-}
+    "Track": Task(
+        "Lead the load along a figure eight, 1.5 m long, in 6 to 10 s each.",
+        _mission(
+            "track", 12.0,
+            {"kind": "figure-eight", "centre": [0.0, 0.0, 1.5], "length": 1.5, "width": 0.75, "ramp": 2.0},
+        ),
+        {**TOLD_WRONG, **START, "reference.period": (6.0, 10.0)},
+    ),
+    "PickAndPlace": Task(
+        "Load and drones stand on the ground: lift the load by 1 m, carry it 1.5 m, put it down.",
+        _mission(
+            "pick-and-place", 9.0,
+            {"kind": "waypoints", "points": _lift(0.0), "travel": 2.0, "hold": 0.75},
+            start={"on_ground": True}, supervision={"kind": "none"},
+        ),
+        {**TOLD_WRONG, "start.heading_deg": (0.0, 360.0)},
+        least_height=-1.0,
+        rigid={"reference.points": _lift(0.075)},
+    ),
+    "LoseOne": Task(
+        "Hold the load still, also when one cable breaks, at 1 to 3 s; nobody is told which. With four drones or more.",
+        _mission(
+            "lose-one", 6.0, {"kind": "hover", "position": [0.0, 0.0, 2.0]}, fault=[{"kind": "cable-cut"}]
+        ),
+        {**TOLD_WRONG, **START, "fault.0.at": (1.0, 3.0)},
+        reach=1.5,
+    ),
+    "Window": Task(
+        "Through an opening of 1.2 by 1.5 m in a wall: narrower than the formation of the start.",
+        _mission(
+            "window", 7.0,
+            {"kind": "waypoints", "points": [[0.0, 0.0, 1.0], [3.0, 0.0, 1.0]], "travel": 5.0, "hold": 1.0},
+        ),
+        {**TOLD_WRONG, "start.heading_deg": (0.0, 360.0)},
+        boxes=_wall(1.5, (-0.6, 0.6, 0.7, 2.2)),
+        gap=(1.5, 0.0, 1.45),
+    ),
+}  # fmt: skip
 """By name; an environment is ``colift/<name>-v0``."""

@@ -150,9 +150,8 @@ class Setting:
                 Problem("drones", repr(self.drones), "must be a whole number from 1 to 64")
             )
         if self.observation == "part" and self.level != "cables":
-            found.append(
-                Problem("observation", "'part'", f'needs level = "cables", not {self.level!r}')
-            )
+            message = f'needs level = "cables", not {self.level!r}'
+            found.append(Problem("observation", "'part'", message))
         if found:
             raise MissionError("environment", found)
         try:
@@ -170,7 +169,8 @@ class Setting:
         drawn = {
             path: np.asarray(rng.uniform(*bounds)).tolist() for path, bounds in self.ranges.items()
         }
-        base = {"drones.count": self.drones, **(RIGID if self.load == "rigid" else {})}
+        rigid = {**RIGID, **self.task.rigid} if self.load == "rigid" else {}
+        base = {"drones.count": self.drones, **rigid}
         own = {"seed": number, "timing.recording": self.period}
         return layered(base, driven(self.level), own, drawn, self.changes)
 
