@@ -9,12 +9,14 @@ import pytest
 
 import colift
 from colift.control.agents.base import AgentPart, Status
+from colift.flight.agents import ALONE, decide, has_left
 from colift.flight.flight import Flight
 from colift.kernel.layout import Layout
 from colift.kernel.math import message
 from colift.kernel.signals import MESSAGE
 from colift.mission import load_mission
 from colift.part import load_file, register
+from colift.record.metrics import tracking_error
 from colift.team import Team
 from colift.world.network.base import NetworkPart
 from colift.world.network.perfect import Perfect
@@ -143,6 +145,37 @@ def test_a_drone_that_left_neither_sends_nor_hears():
     assert (recording["agent_status"][-1, [0, 2]] == [7.0, 9.0]).all()
 
 
+def test_who_carries_is_told_to_all_or_each_knows_it_of_itself():
+    for kind, told in (("none", 0.0), ("self-check", 1.0)):
+        flight = Flight(load_mission("hover", THREE | {"detection.kind": kind}))
+        flight.advance(0.03)
+        bus, leaderless = flight.bus, flight._legs[-1].circuit.leaderless
+        bus.carrying[1] = 0.0
+        bus.views[:] = 1.0
+        decide(
+            *(getattr(flight.wires, name) for name in ("network", "agents", "allocation")),
+            bus,
+            leaderless,
+            3,
+            0.03,
+            0.01,
+        )
+        np.testing.assert_array_equal(bus.evidences[:, 1], [told, 0.0, told])
+        np.testing.assert_array_equal(bus.evidences[:, [0, 2]], 1.0)
+        left = [has_left(bus, leaderless, j) for j in range(3)]
+        assert left == [False, told == 0.0, False]
+        bus.views[[0, 2], 1] = 0.0  # now the others know it, whatever it takes itself for
+        assert has_left(bus, leaderless, 1)
+
+
+def test_an_agent_that_does_not_judge_is_told_at_once():
+    flight = Flight(load_mission("hover", THREE | {"detection.kind": "self-check"}))
+    flight.advance(0.5)
+    flight.bus.carrying[1] = 0.0
+    flight.advance(0.01)
+    assert flight.drones == [0, 2]
+
+
 def test_a_snapshot_holds_what_is_on_its_way():
     flight = Flight(load_mission("hover", THREE))
     flight.advance(0.5)
@@ -204,3 +237,58 @@ def test_optimal_exchange_balances_the_force_that_all_want():
     error = np.linalg.norm(pulls.sum(axis=1) + recording["force"], axis=1)
     weight = recording["force"][-1, 2]
     assert np.median(error[-500:]) < 0.02 * weight
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["drone-lost", "cable-cut"])
+@pytest.mark.parametrize(("n", "drone"), [(4, 0), (4, 1), (4, 2), (4, 3), (6, 5)])
+def test_any_one_drone_may_die_and_nobody_is_told(fault, n, drone):
+    """In the wind of real-world, with half of the messages lost, by what each finds itself and says over the radio."""
+    at = 6.0 + drone
+    settings = {
+        "drones.count": n, "load.mass": 0.225 / 4 * n, "seed": 17 + drone, "timing.duration": at + 6.0,
+        "fault": [{"kind": fault, "at": at, "drone": drone}],
+    }  # fmt: skip
+    flight = Flight(load_mission("leaderless", settings))
+    assert flight._legs[-1].circuit.leaderless == ALONE
+    recording = flight.run()
+    assert recording.outcome == "completed"
+    ((found, who),) = flight.membership.found
+    assert who == drone
+    assert at < found < at + 0.4
+    away = np.linalg.norm(tracking_error(recording), axis=1)
+    assert away.max() < 0.5
+    assert away[recording.time > at + 4.0].max() < 0.15
+
+
+@pytest.mark.slow
+def test_what_the_others_know_of_a_death_they_have_heard():
+    """Who hears nobody keeps the dead in its team, until it hears or misses it; the flight goes on meanwhile."""
+    deaf = {
+        "network": {"kind": "radio", "loss": [0.0, 1.0, 0.0, 0.0], "delay": 0.01, "jitter": 0.0}
+    }
+    settings = {
+        **deaf,
+        "fault": [{"kind": "cable-cut", "at": 2.0, "drone": 0}],
+        "disturbance": [],
+        "seed": 3,
+    }
+    flight = Flight(load_mission("leaderless", settings))
+    flight.advance(2.0)
+    views = []
+    while flight.bus.members.size == 4 and flight.time < 4.0:
+        flight.advance(0.01)
+        if flight.bus.members.size == 4:
+            views.append(
+                (
+                    flight.time,
+                    *flight.bus.views[1:, 0],
+                    flight.bus.carrying[0],
+                    flight.bus.attached[0],
+                )
+            )
+    views = np.array(views)
+    own = views[views[:, 4] == 0.0, 0].min()
+    heard = [views[views[:, k] == 0.0, 0].min(initial=9.0) for k in (2, 3)]
+    assert own < heard[0] == heard[1] <= own + 0.04
+    assert (views[views[:, 0] <= heard[0], 1] == 1.0).all()  # the deaf one does not know it yet

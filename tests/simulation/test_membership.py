@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from colift.control.reference.descent import Descent
@@ -20,13 +19,6 @@ def team():
     bus.reference[:2] = [[1.0, 2.0, 3.0], [0.1, 0.0, 0.0]]
     parts = {layer: getattr(MISSION, layer) for layer in ("allocation", "actuation", "reference")}
     return Membership(MISSION.team), bus, parts
-
-
-def test_whoever_does_not_carry_is_judged_lost_and_noted(team):
-    membership, _, _ = team
-    assert membership.judged_lost([0, 2, 5], np.array([1.0, 0.0, 1.0]), 4.0) == [2]
-    assert membership.judged_lost([0, 5], np.ones(2), 5.0) == []
-    assert membership.found == [(4.0, 2)]
 
 
 def moment(bus, parts, clock):

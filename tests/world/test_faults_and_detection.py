@@ -8,6 +8,7 @@ import pytest
 import colift
 from colift.control.allocation.base import Allocator
 from colift.control.detection.residuals import MEMORY, Residuals
+from colift.control.detection.self_check import SelfCheck
 from colift.control.reference.descent import Descent
 from colift.errors import MissionError
 from colift.flight.flight import Flight
@@ -16,6 +17,7 @@ from colift.kernel.status import Status
 from colift.mission import load_mission
 from colift.mission.outlook import bound, outlook
 from colift.record.metrics import compute
+from colift.team import Team
 from colift.world.fault.base import LOAD
 from colift.world.fault.battery_low import BatteryLow
 from colift.world.fault.motor_degraded import MotorDegraded
@@ -609,3 +611,46 @@ def test_nobody_calls_the_allocator_to_ask_who_can_carry(monkeypatch):
     assert "tension_max" in cannot_carry(flight, [0, 1])
     flight.lose([2])
     assert flight.membership.descent
+
+
+def test_who_judges_itself_knows_nothing_of_the_others():
+    """Rows of the others, and their number, change neither what a drone finds nor what it remembers."""
+    rng, dt = np.random.default_rng(4), 0.01
+    part, team = SelfCheck(), Team.uniform(3)
+    memory, alone = part.memory(team), part.memory(team.of([1]))
+    q = np.tile([1.0, 0, 0, 0], (3, 1))
+    for step in range(200):
+        lost = step >= 150
+        signals = {
+            "estimated_ends": rng.normal(size=(3, 2, 3)), "estimated_positions": rng.normal(size=(3, 3)),
+            "estimated_velocities": rng.normal(size=(3, 3)), "estimated_attitudes": q, "thrusts": team.masses * team.gravity,
+            "received_tensions": rng.uniform(0.5, 1.0, 3), "received_directions": np.tile([0.0, 0.0, -1.0], (3, 1)),
+        }  # fmt: skip
+        # Drone 1 hangs still on its cable, until it falls with motors that should hold it.
+        fall = 9.81 * dt * max(step - 150, 0)
+        signals["estimated_ends"][1] = [[0.0, 0.0, -1.0], [0.0, 0.0, 0.0]]
+        signals["estimated_positions"][1] = [0.0, 0.0, -0.5 * fall**2 / 9.81]
+        signals["estimated_velocities"][1] = [0.0, 0.0, -fall]
+        carrying, single = np.ones(3), np.ones(1)
+        part.call(team, memory, dt=dt, carrying=carrying, **signals)
+        own = {name: value[1:2] for name, value in signals.items()}
+        part.call(team.of([1]), alone, dt=dt, carrying=single, **own)
+        assert carrying[1] == single[0]
+        np.testing.assert_array_equal(memory.reshape(3, -1)[1], alone)
+        if not carrying[1]:
+            break
+        assert not lost or step < 165
+    assert not carrying[1]
+    assert 154 <= step < 165
+
+
+def test_what_a_drone_remembers_of_itself_stays_its_own_when_another_leaves():
+    part, team = SelfCheck(), Team.uniform(3)
+    old = np.arange(part.memory(team).size, dtype=float)
+    kept = part.carry_over(old, part.memory(team.of([0, 2])), np.array([0, 2])).reshape(2, -1)
+    before = old.reshape(3, -1)[[0, 2]]
+    assert (
+        kept != before
+    ).sum() == 4  # for both when the team changed, and whether the load tumbled
+    fresh = part.carry_over(old, part.memory(team), np.array([-1, 0, 1])).reshape(3, -1)
+    assert not fresh[0].any()

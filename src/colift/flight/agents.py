@@ -20,9 +20,12 @@ _agree, carry, _plan, _control = (
     PORTS[name].invoke for name in ("agents", "network", "allocation", "load_control")
 )
 
+CENTRAL, TOLD, ALONE = 0, 1, 2
+"""Who decides: one allocator; each drone, told who carries; each drone, which knows that of itself only."""
+
 SIGNALS = (
-    "force", "steady_force", "reference", "load_views", "viewed_load", "viewed_forces", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "desired_tensions",
-    "desired_directions", "outboxes", "agreed_forces", "asking", "asked_forces", "team_tensions", "team_directions",
+    "force", "steady_force", "reference", "load_views", "viewed_load", "viewed_forces", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "evidences", "desired_tensions",
+    "desired_directions", "outboxes", "views", "estimated_load", "agreed_forces", "asking", "asked_forces", "team_tensions", "team_directions",
     "agent_status", "received_tensions", "received_directions",
 )  # fmt: skip
 """What a cycle takes and gives of the bus, beside what the network does."""
@@ -33,10 +36,10 @@ def rows_of(bus, i):  # type: ignore[no-untyped-def]
     """What drone i sees and what it writes."""
     sees = Sees(
         bus.wishes[i], bus.steady_wishes[i], bus.plans[i], bus.members[i : i + 1], bus.members, bus.inboxes[i],
-        bus.heard[i], bus.carrying, bus.felt_forces[i],
+        bus.heard[i], bus.evidences[i], bus.felt_forces[i], bus.estimated_load[1],
     )  # fmt: skip
     writes = Writes(
-        bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i],
+        bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i], bus.views[i],
         bus.asking[i : i + 1], bus.agreed_forces[i], bus.asked_forces[i], bus.team_tensions[i], bus.team_directions[i],
     )  # fmt: skip
     return sees, writes
@@ -111,11 +114,29 @@ def decide_one(agents, allocation, bus, i, cycle, time, dt):  # type: ignore[no-
 
 
 @register_jitable
-def decide(network, agents, allocation, bus, cycle, time, dt):  # type: ignore[no-untyped-def]
-    """Carry what the drones said in the last cycle; let each decide and fly what it decides at once."""
+def decide(network, agents, allocation, bus, leaderless, cycle, time, dt):  # type: ignore[no-untyped-def]
+    """Carry what the drones said in the last cycle; let each decide and fly what it decides at once.
+
+    Who carries is told to all, or, where ``leaderless`` is :data:`ALONE`, each knows it of itself.
+    """
     carry(network, cycle, time, dt)
-    for i in range(bus.members.shape[0]):
+    n = bus.members.shape[0]
+    for i in range(n):
+        for j in range(n):
+            told = i == j or leaderless != ALONE
+            bus.evidences[i, j] = bus.carrying[j] if told else 1.0
         decide_one(agents, allocation, bus, i, cycle, time, dt)
+
+
+@register_jitable
+def has_left(bus, leaderless, j):  # type: ignore[no-untyped-def]
+    """Whether drone j carries no more, and all that do know it."""
+    if bus.carrying[j] != 0.0:
+        return False
+    for i in range(bus.carrying.shape[0]):
+        if leaderless == ALONE and bus.carrying[i] != 0.0 and bus.views[i, j] != 0.0:
+            return False
+    return True
 
 
 def first_of(signals: dict[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from colift.control.agents.base import AgentPart
 from colift.control.allocation.base import AllocatorPart
 from colift.control.reference.base import ReferencePart
 from colift.errors import ColiftError, Problem, SettingError
+from colift.flight.agents import has_left
 from colift.flight.leg import Leg, Stretch, due_rows, places_of
 from colift.flight.loop import CYCLE_WIDTH, Circuit, Periods, advance, circuit
 from colift.flight.membership import Membership
@@ -443,12 +444,21 @@ class Flight:
                 self._cut(*touched)
             elif not np.isfinite(leg.bus.row).all():
                 self.outcome = f"diverged before t = {self.time:g} s"
-            elif not leg.bus.carrying.all():
-                lost = self.membership.judged_lost(leg.drones, leg.bus.carrying, self.time)
+            elif lost := self._left():
+                self.membership.found += [(self.time, drone) for drone in lost]
                 if len(lost) < len(leg.drones):
                     self.lose(lost)
                 else:
                     self.outcome = f"no drone left to carry at t = {self.time:g} s"
+
+    def _left(self) -> list[int]:
+        """Who has been judged lost, and is known to be by all that it concerns."""
+        leg = self._legs[-1]
+        return [
+            drone
+            for place, drone in enumerate(leg.drones)
+            if has_left(leg.bus, leg.circuit.leaderless, place)
+        ]
 
     def lose(self, lost: list[int]) -> None:
         """Go on without these drones; if the others cannot hold the load in hover, bring it down."""

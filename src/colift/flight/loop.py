@@ -53,7 +53,7 @@ Common = named_tuple(
         "reference_attitude", "reference_rates", "nominal_forces", "attachments",
         "estimated_load", "estimated_load_attitude", "estimated_load_rates", "estimated_ends", "wanted_ends", "reference_shift",
         "lift_share", "unhooked", "attached", "winches", "reeled",
-        *(name for name in agents.SIGNALS if name not in {"carrying", "reference"}),
+        *(name for name in agents.SIGNALS if name not in {"carrying", "reference", "estimated_load"}),
     ],
     __name__,
 )  # fmt: skip
@@ -98,7 +98,8 @@ _control_position = PORTS["position_control"].invoke
 _control_attitude = PORTS["attitude_control"].invoke
 _actuate, _detect = PORTS["actuation"].invoke, PORTS["detection"].invoke
 _disturb = PORTS["disturbance"].invoke
-_wish, _decide = agents.wish, agents.decide
+_wish, _decide, _has_left = agents.wish, agents.decide, agents.has_left
+_ALONE = agents.ALONE
 
 
 @register_jitable  # plain Python in the plain loop
@@ -145,7 +146,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
     """Run physics steps ``first <= k < last``; return the step reached.
 
     It ends early, after a whole step, when a drone is judged lost: the caller regroups. The rows of ``log`` and
-    ``cycles`` are those due from ``first`` on. ``leaderless`` is 1 where each drone's agent decides, else 0. Of the wires
+    ``cycles`` are those due from ``first`` on. ``leaderless`` is one of :data:`colift.flight.agents.CENTRAL` and its like. Of the wires
     ``disturbing`` the first ``disturbances`` are in use.
     """
     dt = every.step
@@ -189,7 +190,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
                 begin = monotonic_ns()
                 cycle = k // every.allocation
                 _decide(
-                    wires.network, wires.agents, wires.allocation, bus, cycle, t,
+                    wires.network, wires.agents, wires.allocation, bus, leaderless, cycle, t,
                     every.allocation * dt,
                 )  # fmt: skip
                 end = monotonic_ns()
@@ -222,7 +223,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
 
         _actuate(wires.actuation, k, t, dt)
         for i in range(n):
-            if bus.unhooked[i] != 0.0:
+            if bus.unhooked[i] != 0.0 or (leaderless == _ALONE and bus.carrying[i] == 0.0):
                 bus.attached[i] = 0.0
         bus.wind[:] = 0.0
         bus.external_forces[:] = 0.0
@@ -239,7 +240,7 @@ def advance(first, last, every, wires, leaderless, disturbances, disturbing, bus
             bus.catch_impulses[:] = 0.0
             bus.touch_speeds[:] = 0.0
         for i in range(n):
-            if bus.carrying[i] == 0.0:
+            if _has_left(bus, leaderless, i):
                 return k + 1
     return last
 
@@ -249,7 +250,7 @@ class Circuit:
     """All that the loop calls, wired to one bus."""
 
     wires: Any
-    leaderless: bool
+    leaderless: int
     disturbances: tuple[Wire, ...]
     common: Any
 
@@ -261,7 +262,7 @@ class Circuit:
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """As :func:`advance` takes them, compiled or not."""
-        leaderless, used = int(self.leaderless), len(self.disturbances)
+        leaderless, used = self.leaderless, len(self.disturbances)
         if not self.compiled:
             return self.wires, leaderless, used, self.disturbances, self.common
         wires = type(self.wires)(*(wire.compiled() for wire in self.wires))
@@ -312,7 +313,9 @@ def circuit(
         for part, key, own, kept in disturbances
     )
     common = Common(*(signals[name] for name in Common._fields))
-    return Circuit(Wires(**wires), parts["agents"].decides, others, common)
+    decides, alone = parts["agents"].decides, parts["detection"].of_itself
+    leaderless = agents.CENTRAL if not decides else agents.ALONE if alone else agents.TOLD
+    return Circuit(Wires(**wires), leaderless, others, common)
 
 
 def is_compiled(function: Any) -> bool:

@@ -53,12 +53,6 @@ class Membership:
     formation: Array | None = None
     said: tuple[tuple[float, str], ...] = ()
 
-    def judged_lost(self, drones: list[int], carrying: Any, time: float) -> list[int]:
-        """Those of ``drones`` whose ``carrying`` (n,) is 0 now; they are noted in :attr:`found`."""
-        lost = [drone for drone, carries in zip(drones, carrying, strict=True) if not carries]
-        self.found += [(time, drone) for drone in lost]
-        return lost
-
     def go_on(
         self,
         drones: list[int],

@@ -254,7 +254,7 @@ PORTS: dict[str, Port] = {
         Port("network", sees=("outboxes", "members")),
         Port(
             "agents",
-            sees=("wish", "steady_wish", "reference", "number", "members", "inbox", "heard", "evidence", "felt"),
+            sees=("wish", "steady_wish", "reference", "number", "members", "inbox", "heard", "evidence", "felt", "velocity"),
             answers=True,
             table={signal.name: signal for signal in OF_ONE},
         ),

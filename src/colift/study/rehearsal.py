@@ -137,6 +137,7 @@ class Rehearsal:
         bus = make_bus(team.n)
         bus.members[:] = np.arange(team.n)
         bus.desired_directions[:] = directions
+        bus.estimated_load[:] = np.nan  # there is none
         if clock_errors is not None:
             bus.clock_errors[:] = clock_errors
         signals: dict[str, Any] = bus._asdict()

@@ -5,7 +5,7 @@ bytes  what
 ====== ===========================================================================================
 0      number of the drone (4 bits), session (4): 1 to 15, the next after a restart
 1-2    count of its cycles, the low 16 bits
-3-4    its view of the team: a bit for each number; its own is 0 while it holds, as it misses somebody
+3-4    its view of the team: a bit for each number; its own is 0 while it holds, as it misses somebody; 0: it has left
 5-10   steady wish, three numbers of 16 bits, in the team's unit, in the planned frame
 11-16  pull beside its share of the wish, likewise
 17-21  a pair: peer (4 bits), version (3) and first (1) of its own reference, answered version (3), yes (1),
@@ -29,6 +29,8 @@ MOST = 16
 """Drones in a team: as many as four bits can number."""
 WHO, COUNT, TEAM, WISH, SHARE, PAIRS, SEAL = 0, 1, 3, 5, 11, 17, 27
 PAIR = 5
+NOBODY = 0
+"""The view of the team of one that has left it."""
 SIDE = 4094
 """Steps along a side of the octahedron's map: even, so that its middle has a code."""
 _WORD = 0xFFFFFFFF

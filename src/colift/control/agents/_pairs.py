@@ -23,14 +23,14 @@ from colift.kernel.layout import Layout
 
 PEER = Layout(
     team={
-        "inside": 1, "gone": 1, "liar": 1, "holds": 1, "doubt": 1, "met": 1, "usual": 3, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
+        "inside": 1, "gone": 1, "left": 1, "liar": 1, "holds": 1, "doubt": 1, "met": 1, "usual": 3, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
         "state": 1, "version": 1, "code": 1, "r0": 3, "r1": 3, "reach": 1,
         "known": 1, "rb": 3, "seen": 1, "yes": 1, "due": 1,
     }
 )  # fmt: skip
 """What a drone keeps of each peer. ``silent``: cycles since it was heard; ``reach``: share of the way to where it wants to be that is
 offered; ``gone``: left out by what the load did, as a ``liar``
-though it speaks; ``usual``: pull, of one that was ``met``, for a while; ``seen``: version decided last; ``due``: it waits for an answer."""
+though it speaks; ``left``: it has said so itself; ``usual``: pull, of one that was ``met``, for a while; ``seen``: version decided last; ``due``: it waits for an answer."""
 Q, WIDTH = PEER.at, PEER.size(0)
 SETTLED, OFFERED, FIRST = 0.0, 1.0, 2.0
 """``state`` of the own reference: r1 is out only in the second."""

@@ -34,11 +34,11 @@ PARAMS = Layout(
 MEMORY = Layout(
     drone={
         "started": 1, "asked": 1, "planned": 1, "turn": 1, "session": 1, "up": 3, "a": 3, "w": 3, "b": 3,
-        "target": 3, "mean": 3, "agreed": 3, "wish": 3, "steady": 3, "said": 6, "lack": 6, "flown": 3, "pull": 3, "peers": WIDTH * MOST,
+        "target": 3, "mean": 3, "agreed": 3, "wish": 3, "steady": 3, "said": 6, "lack": 7, "velocity": 4, "flown": 3, "pull": 3, "peers": WIDTH * MOST,
     }
 )  # fmt: skip
 """``up``: axis of the planned frame, ``a``: direction in it, ``b``: pull beside the share of the wish, ``target``: where the plan of the formation
-wants it, ``mean``: mean of the steady wishes, ``agreed``: while nobody held; ``lack``: force on the load that nobody explains, and what of it is usual; ``pull``: as flown, ``flown``: ``b`` of it; ``said``: own
+wants it, ``mean``: mean of the steady wishes, ``agreed``: while nobody held; ``lack``: force on the load that nobody explains, and what of it is usual, and since when; ``velocity`` of the load, and whether it is known; ``pull``: as flown, ``flown``: ``b`` of it; ``said``: own
 wish and pull as the others hear them, so that all see the same; ``turn``: peer that was written to last; ``session``: 1 to 15, the next after
 a restart, which is told from outside; ``w``: scratch."""
 P, M = PARAMS.at, MEMORY.at
@@ -119,6 +119,7 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
         memory[o + Q.silent] = 0.0
         team = message.get16(text, message.TEAM)
         memory[o + Q.holds] = 1.0 if (team >> j) & 1 == 0 else 0.0
+        memory[o + Q.left] = 1.0 if team == message.NOBODY else 0.0
         session = (int(text[message.WHO]) >> 4) & 15
         if session != memory[o + Q.session]:
             memory[o + Q.session] = session
@@ -150,7 +151,7 @@ def _view(sees, memory, me, n, count, late, started):  # type: ignore[no-untyped
                 here = memory[o + Q.inside] != 0.0 and memory[o + Q.silent] <= late
                 there = sees.evidence[row] != 0.0 or here
         if memory[o + Q.inside] != 0.0 and memory[o + Q.silent] > late:
-            if evidence.missing(memory, o, M.lack, count):
+            if memory[o + Q.doubt] > evidence.SILENT:
                 memory[o + Q.gone] = 1.0
         elif memory[o + Q.doubt] > evidence.SURE:
             memory[o + Q.gone] = memory[o + Q.liar] = 1.0
@@ -159,7 +160,7 @@ def _view(sees, memory, me, n, count, late, started):  # type: ignore[no-untyped
                 memory[o + Q.share + k] = memory[o + Q.usual + k] + memory[M.mean + k] / count
         elif memory[o + Q.silent] == 0.0 and memory[o + Q.liar] == 0.0:
             memory[o + Q.gone] = 0.0
-        there = there and memory[o + Q.gone] == 0.0
+        there = there and memory[o + Q.gone] == 0.0 and memory[o + Q.left] == 0.0
         if there and memory[o + Q.inside] == 0.0:
             memory[o + Q.inside] = 1.0
             pairs.stand(memory, o, M.a)
@@ -279,7 +280,7 @@ def _next_peer(memory, turn):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _speak(now, sees, params, memory, writes, holding):  # type: ignore[no-untyped-def]
+def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[no-untyped-def]
     text = writes.outbox
     number = int(sees.number[0])
     wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
@@ -288,6 +289,8 @@ def _speak(now, sees, params, memory, writes, holding):  # type: ignore[no-untyp
     team = 0 if holding else 1 << number
     for j in range(MOST):
         team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
+    if leaves:
+        team = message.NOBODY
     message.put16(text, message.TEAM, team)
     for k in range(3):
         wish, share = message.WISH + 2 * k, message.SHARE + 2 * k
@@ -370,8 +373,14 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     team = 1
     for j in range(MOST):
         team += int(memory[M.peers + WIDTH * j + Q.inside])
-    x, y, z = frame.to_frame(memory, M.up, sees.felt[0], sees.felt[1], sees.felt[2])
-    evidence.weigh(memory, M.peers, M.lack, (x, y, z), M.pull, team, late, dt)
+    x, y, z = evidence.feel(
+        memory, M.velocity, M.steady, M.up, plan, sees.velocity, params[P.g], dt
+    )
+    measured = math.isfinite(sees.felt[0] + sees.felt[1] + sees.felt[2])
+    if measured:
+        x, y, z = sees.felt[0], sees.felt[1], sees.felt[2]
+    x, y, z = frame.to_frame(memory, M.up, x, y, z)
+    evidence.weigh(memory, M.peers, M.lack, (x, y, z), measured, M.pull, team, late, dt)
     team = _view(sees, memory, me, n, team, late, started)
 
     holding = others = False
@@ -436,7 +445,10 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     period = max(1, int(params[P.period] / dt + 0.5))
     if team == n and n > 1 and not (holding or others) and now.step % period == 0:
         _ask(sees, memory, writes, me, n, period * dt)
-    _speak(now, sees, params, memory, writes, holding)
+    for row in range(n):
+        inside = row == me or memory[M.peers + WIDTH * int(sees.members[row]) + Q.inside] != 0.0
+        writes.inside[row] = 1.0 if inside else 0.0
+    _speak(now, sees, params, memory, writes, holding, sees.evidence[me] == 0.0)
     return (HOLDING if holding or others else FREE) | (CLIPPED if missing > 1e-3 * size else FREE)
 
 

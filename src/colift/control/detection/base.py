@@ -19,3 +19,6 @@ class DetectionPart(Part):
     """Base of all methods of detection."""
 
     layer: ClassVar[str] = "detection"
+    of_itself: ClassVar[bool] = False
+    """Whether each drone judges itself and nobody else. In a team without a leader it then lets go of its own cable, and the others learn of it by
+    its agent only; else all are told."""

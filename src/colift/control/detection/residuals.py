@@ -79,7 +79,7 @@ def _turning(n, ends):  # type: ignore[no-untyped-def]
 
 
 @kernel(SIGNATURE)
-def _judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+def judge(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     dt = now.dt
     ends, positions = sees.estimated_ends, sees.estimated_positions
     velocities, attitudes = sees.estimated_velocities, sees.estimated_attitudes
@@ -210,7 +210,7 @@ class Residuals(DetectionPart):
     went on for ``astray`` meanwhile, or, where asked for, after a while (``frozen``).
     """
 
-    kernel = _judge
+    kernel = judge
     remembers = MEMORY
 
     filter: Annotated[float, Field(ge=0.002, le=1.0)] = 0.03

@@ -1,0 +1,69 @@
+"""Each drone judges itself, by what it measures itself: for teams without a leader, and wherever nobody sees all."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from colift.control.detection.base import SIGNATURE
+from colift.control.detection.residuals import Residuals, judge
+from colift.kernel.jit import kernel
+from colift.kernel.ports import PORTS
+from colift.part import Places, Vector
+from colift.team import Team
+
+SETTLES = 0.5
+"""Least grace after a change of the team, s."""
+Sees, Writes = PORTS["detection"].Sees, PORTS["detection"].Writes
+
+
+@kernel(SIGNATURE)
+def _judge_itself(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
+    n = sees.estimated_positions.shape[0]
+    wide, long = params.shape[0] // n, memory.shape[0] // n
+    for i in range(n):
+        own = slice(i, i + 1)
+        alone = Sees(
+            sees.estimated_ends[own], sees.estimated_positions[own], sees.estimated_velocities[own],
+            sees.estimated_attitudes[own], sees.estimated_ages[own], sees.thrusts[own], sees.lift_share, sees.reeled[own],
+            sees.received_tensions[own], sees.received_directions[own], sees.received_ages[own],
+        )  # fmt: skip
+        judge(
+            now, alone, params[wide * i : wide * (i + 1)], memory[long * i : long * (i + 1)],
+            Writes(writes.carrying[own]),
+        )  # fmt: skip
+
+
+class SelfCheck(Residuals):
+    """The signs of ``residuals``, of each drone by itself: it knows nothing of the wind of the others, nor whether all cables change.
+
+    So a sign must last longer, and a cable part faster.
+    """
+
+    kernel = _judge_itself
+    of_itself: ClassVar[bool] = True
+
+    hold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.05
+    """Time for which a sign must last, s."""
+
+    def grace_of(self, team: Team) -> float:
+        """Also with a point: who learns late that another is gone asks its cable for more at once."""
+        return max(super().grace_of(team), SETTLES) if self.grace is None else self.grace
+
+    def params(self, team: Team) -> Vector:
+        """As of teams of one, one after the other."""
+        return np.concatenate([super(SelfCheck, self).params(team.of([i])) for i in range(team.n)])
+
+    def memory(self, team: Team) -> Vector:
+        return np.tile(super().memory(team.of([0])), team.n)
+
+    def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
+        before, alone = old.reshape(-1, fresh.size // len(places)), np.zeros(1, dtype=int)
+        rows = zip(fresh.reshape(len(places), -1), places.tolist(), strict=True)
+        kept = [
+            row if at < 0 else super(SelfCheck, self).carry_over(before[at], row, alone)
+            for row, at in rows
+        ]
+        return np.concatenate(kept)
