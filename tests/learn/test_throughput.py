@@ -1,6 +1,5 @@
 """The measurement of throughput measures what it says; nothing here asserts wall time."""
 
-
 import numpy as np
 import pytest
 

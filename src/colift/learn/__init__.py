@@ -19,17 +19,19 @@ from colift.learn.tasks import TASKS
 
 if TYPE_CHECKING:
     from colift.learn.environments import TeamEnv, TeamVectorEnv
+    from colift.learn.parallel import DronesEnv
     from colift.learn.teams import Teams
     from colift.learn.worlds import Setting
 
 _HOMES = {
+    "DronesEnv": "colift.learn.parallel",
     "Setting": "colift.learn.worlds",
     "TeamEnv": "colift.learn.environments",
     "TeamVectorEnv": "colift.learn.environments",
     "Teams": "colift.learn.teams",
 }
 
-__all__ = ["TASKS", "Setting", "TeamEnv", "TeamVectorEnv", "Teams"]
+__all__ = ["TASKS", "DronesEnv", "Setting", "TeamEnv", "TeamVectorEnv", "Teams"]
 
 __getattr__ = lookup(__name__, _HOMES)
 
