@@ -278,4 +278,6 @@ class SitlFlight:
         carrying = (self._silent[drones] <= SILENCE).astype(float)
         if not carrying.all() and carrying.any():
             flight = self.flight
-            flight.lose(flight.membership.judged_lost(drones, carrying, flight.time))
+            lost = [drone for drone, carries in zip(drones, carrying, strict=True) if not carries]
+            flight.membership.found += [(flight.time, drone) for drone in lost]
+            flight.lose(lost)
