@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -18,7 +19,7 @@ from packaging.requirements import Requirement
 import colift
 from colift import catalogue, extras
 from colift.cli import _commands
-from colift.kernel import jit
+from colift.kernel import jit, prebuilt
 from colift.part import find
 
 ROOT = Path(__file__).parents[1]
@@ -231,10 +232,39 @@ def test_compile_says_how_much_it_did_and_is_done_when_another_copy_of_colift_di
 
 
 @needs_jit
+def test_machine_code_that_came_along_is_not_compiled(tmp_path):
+    """As in a wheel that ``hatch_build.py`` has put it into."""
+    if prebuilt.processor() is None:
+        pytest.skip("no machine code comes for a processor like this one")
+    command = [sys.executable, "-m", "colift", "compile", "--allocator", "min-norm", "--json"]
+    name, features = prebuilt.processor()
+    package = tmp_path / "src" / "colift"
+    shutil.copytree(
+        Path(colift.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
+    )
+
+    def compiled(cache, **told):
+        environment = {"COLIFT_CACHE": str(tmp_path / cache), "PYTHONPATH": str(package.parent)}
+        said = subprocess.run(
+            command, env=os.environ | environment | told, text=True, capture_output=True, check=True, timeout=600,
+        ).stdout  # fmt: skip
+        return len(json.loads(said)["compiled"])
+
+    assert compiled("release", NUMBA_CPU_NAME=name, NUMBA_CPU_FEATURES=features) == 2
+    (tmp_path / "release").rename(package / prebuilt.FOLDER.name)
+    assert compiled("empty") == 0
+
+
+def test_machine_code_for_a_processor_with_more_is_left_alone(monkeypatch):
+    monkeypatch.setattr(prebuilt, "COMMON", {platform.machine(): ("generic", "+no-such-feature")})
+    assert prebuilt.processor.__wrapped__() is None
+
+
+@needs_jit
 def test_what_a_mission_needs_is_there_after_it_was_warmed():
     script = """
 import colift
-from colift.kernel import jit
+from colift.kernel import jit, prebuilt
 mission = {"name": "x", "reference": {"kind": "hover"}, "plant": {"kind": "slack-cables"},
            "disturbance": [{"kind": "wind"}], "timing": {"duration": 0.1},
            "events": [{"at": 0.05, "field": "allocation.kind", "value": "sqp"}]}

@@ -31,6 +31,7 @@ from numba.core import caching, cgutils, event, sigutils
 from numba.core.runtime import _nrt_python as _nrt  # type: ignore[attr-defined]
 from numba.extending import intrinsic, overload
 
+from colift.kernel import prebuilt
 from colift.kernel.compiling import BodyCompiler, hurried
 
 try:
@@ -253,6 +254,8 @@ class _Cache(caching.FunctionCache):
             llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
         with self._guard_against_spurious_io_errors():
             found = self._load_overload(sig, target_context)
+            if found is None:
+                found = prebuilt.load(self, sig, target_context)
             if found is None and self._wait():
                 found = self._load_overload(sig, target_context)
             return found
