@@ -22,9 +22,14 @@ def requirements(extra: str) -> list[str]:
         project = Path(__file__).resolve().parents[2] / "pyproject.toml"
         table = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
         return list(table["optional-dependencies"][extra])
-    mark = re.compile(rf"extra\s*==\s*['\"]{re.escape(extra)}['\"]")
+    mark = re.compile(rf"(\s+and\s+)?extra\s*==\s*['\"]{re.escape(extra)}['\"]")
     found = [text.partition(";") for text in declared]
-    return [package.strip() for package, _, condition in found if mark.search(condition)]
+    asked = [
+        (package.strip(), mark.sub("", condition).strip())
+        for package, _, condition in found
+        if mark.search(condition)
+    ]
+    return [f"{package}; {rest}" if rest else package for package, rest in asked]
 
 
 def install(extra: str) -> str:

@@ -75,7 +75,7 @@ TABLE = [
     ({"reference.kind": ["hover"]}, ["reference.kind: must be one of", "found ['hover']"]),
     ({"reference.kind": True}, ["reference.kind: must be one of", "found True"]),
     ({"reference.kind": {}}, ["reference.kind: must be one of", "found {}"]),
-    ({"reference": {}}, ["reference.kind: is required", "figure-eight, guided, hover, spiral, waypoints"]),
+    ({"reference": {}}, ["reference.kind: is required", "figure-eight, guided, hover, plan, spiral, waypoints"]),
     ({"reference": "spiral"}, ["reference: must be a table", "found 'spiral'"]),
     ({"plant": 3}, ["plant: must be a table"]),
     ({"allocation": [{"kind": "sqp"}]}, ["allocation: must be a table"]),

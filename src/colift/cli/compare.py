@@ -114,34 +114,23 @@ def compare(
     """
     from colift.mission.load import parse_overrides
 
-    agents = agents or schemes is not None
-    if agents and allocators is not None:
-        raise typer.BadParameter(
-            "compares allocators; leave out --agents and --schemes", param_hint="--allocators"
-        )
-    layer, wanted = ("agents", schemes) if agents else ("allocation", allocators)
+    layer, wanted = _compared(allocators, agents, schemes)
     with loading():
         from colift.study import compare as study
         from colift.study.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
-        own = study.own_parts(sources, layer)
-        able, missing = study.contestants(several(wanted) or None, own, layer)
+        able, missing = study.contestants(
+            several(wanted) or None, study.own_parts(sources, layer), layer
+        )
         changes = parse_overrides(sets)
         if quick:
             seeds, changes = 1, {"timing.duration": 4.0, **changes}
-        usual = study.AGENTS_MISSIONS if agents else study.MISSIONS
-        chosen = several(missions) or (study.QUICK_MISSIONS if quick else usual)
+        chosen = several(missions) or study.usual_missions(layer, quick=quick)
         flown_seeds = range(first_seed, first_seed + seeds)
         cases = study.cases(
-            able,
-            chosen,
-            flown_seeds,
-            changes,
-            spread=spread,
-            as_in_mission=as_in_mission,
-            layer=layer,
-        )
+            able, chosen, flown_seeds, changes, spread=spread, as_in_mission=as_in_mission, layer=layer
+        )  # fmt: skip
         planned, refused = sift(cases, sources)
     say_refused(refused)
     target = folder or new_folder("compare")
@@ -159,12 +148,19 @@ def compare(
     }  # fmt: skip
     save_json(target / "compare.json", result)
     export(rows, csv, parquet)
-    if as_json:
-        emit(result)
-    else:
-        _say(rows, result)
-        show_end(outcome, result["files"])
+    _say(rows, result, outcome, as_json=as_json)
     end(rows, strict)
+
+
+def _compared(allocators: str | None, agents: bool, schemes: str | None) -> tuple[str, str | None]:
+    """The layer whose parts are compared, and which of them."""
+    if not agents and schemes is None:
+        return "allocation", allocators
+    if allocators is not None:
+        raise typer.BadParameter(
+            "compares allocators; leave out --agents and --schemes", param_hint="--allocators"
+        )
+    return "agents", schemes
 
 
 def _judge(rows: Sequence[dict[str, Any]], target: Path, notes: Sequence[str]) -> dict[str, Any]:
@@ -193,7 +189,12 @@ def _judge(rows: Sequence[dict[str, Any]], target: Path, notes: Sequence[str]) -
     }  # fmt: skip
 
 
-def _say(rows: Sequence[dict[str, Any]], result: dict[str, Any]) -> None:
+def _say(
+    rows: Sequence[dict[str, Any]], result: dict[str, Any], outcome: Any, *, as_json: bool
+) -> None:
+    if as_json:
+        emit(result)
+        return
     from colift.show.report.campaign import contest_table
     from colift.study.campaign import judge
     from colift.study.compare import CONTEST
@@ -208,3 +209,4 @@ def _say(rows: Sequence[dict[str, Any]], result: dict[str, Any]) -> None:
         out.print(f"- {escape(sentence)}", highlight=False)
     for sentence in result["not_installed"]:
         out.print(f"Not compared: {escape(sentence)}", highlight=False)
+    show_end(outcome, result["files"])

@@ -214,6 +214,13 @@ def protocol(
     return said
 
 
+def usual_missions(layer: str, *, quick: bool) -> tuple[str, ...]:
+    """What is flown where nobody names missions, for parts of a layer."""
+    if quick:
+        return QUICK_MISSIONS
+    return AGENTS_MISSIONS if layer == "agents" else MISSIONS
+
+
 def own_parts(sources: Sequence[Source], layer: str = "allocation") -> list[str]:
     """Names of the allocators, or parts of another layer, in a user's files, which are registered by this."""
     return [source.name for source in sources for part in source.load() if part.layer == layer]

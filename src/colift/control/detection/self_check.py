@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.detection.base import SIGNATURE
-from colift.control.detection.residuals import Residuals, judge
+from colift.control.detection.residuals import MEMORY, Residuals, judge
 from colift.kernel.jit import kernel
+from colift.kernel.layout import Layout
 from colift.kernel.ports import PORTS
 from colift.part import Places, Vector
 from colift.team import Team
@@ -24,15 +25,15 @@ def _judge_itself(now, sees, params, memory, writes):  # type: ignore[no-untyped
     n = sees.estimated_positions.shape[0]
     wide, long = params.shape[0] // n, memory.shape[0] // n
     for i in range(n):
-        own = slice(i, i + 1)
+        p, o = wide * i, long * i
         alone = Sees(
-            sees.estimated_ends[own], sees.estimated_positions[own], sees.estimated_velocities[own],
-            sees.estimated_attitudes[own], sees.estimated_ages[own], sees.thrusts[own], sees.lift_share, sees.reeled[own],
-            sees.received_tensions[own], sees.received_directions[own], sees.received_ages[own],
+            sees.estimated_ends[i : i + 1], sees.estimated_positions[i : i + 1], sees.estimated_velocities[i : i + 1],
+            sees.estimated_attitudes[i : i + 1], sees.estimated_ages[i : i + 1], sees.thrusts[i : i + 1], sees.lift_share, sees.reeled[i : i + 1],
+            sees.received_tensions[i : i + 1], sees.received_directions[i : i + 1], sees.received_ages[i : i + 1],
         )  # fmt: skip
         judge(
-            now, alone, params[wide * i : wide * (i + 1)], memory[long * i : long * (i + 1)],
-            Writes(writes.carrying[own]),
+            now, alone, params[p : p + wide], memory[o : o + long],
+            Writes(writes.carrying[i : i + 1]),
         )  # fmt: skip
 
 
@@ -43,6 +44,7 @@ class SelfCheck(Residuals):
     """
 
     kernel = _judge_itself
+    remembers = Layout(drone=MEMORY.team | MEMORY.drone)
     of_itself: ClassVar[bool] = True
 
     hold: Annotated[float, Field(ge=0.0, le=1.0)] = 0.05
@@ -55,9 +57,6 @@ class SelfCheck(Residuals):
     def params(self, team: Team) -> Vector:
         """As of teams of one, one after the other."""
         return np.concatenate([super(SelfCheck, self).params(team.of([i])) for i in range(team.n)])
-
-    def memory(self, team: Team) -> Vector:
-        return np.tile(super().memory(team.of([0])), team.n)
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
         before, alone = old.reshape(-1, fresh.size // len(places)), np.zeros(1, dtype=int)

@@ -14,6 +14,7 @@ from colift.deploy.c.source import Source
 from colift.deploy.c.types import (
     BOOL,
     INT,
+    NOTHING,
     NUMBERS,
     REAL,
     Array,
@@ -161,10 +162,15 @@ class Expressions:
             for part in value.parts:
                 if isinstance(part.type, Array) and not part.type.const:
                     self.written |= part.type.roots  # through this tuple it may be written to
-            codes = (
+            codes = [
                 self.converted(part, each, node)
                 for part, each in zip(value.parts, kind.each, strict=True)
-            )
+                if each != NOTHING
+            ]
+            counted = self.program.counted(kind)
+            if counted is not None:  # how many drones there are stands before the fields
+                length = value.parts[kind.names().index(counted)].type.length
+                codes.insert(0, self.length(length, node).code)
             begin, end = ("{{", "}}") if kind.uniform else ("{", "}")
             return f"({self.program.spelled(kind)}){begin}{', '.join(codes)}{end}"
         return self.real(value).code if kind == REAL else value.code
@@ -494,6 +500,17 @@ class Expressions:
             if isinstance(begin.known, int) and isinstance(end.known, int):
                 return begin, end.known - begin.known
             length = end.code if begin.known == 0 else f"{end.code} - {begin.within(PRODUCT)}"
+            upper = place.upper
+            if (
+                place.lower
+                and isinstance(upper, ast.BinOp)
+                and isinstance(upper.op, ast.Add)
+                and ast.dump(upper.left) == ast.dump(place.lower)
+            ):  # begin : begin + length
+                told = self.value(upper.right)
+                if isinstance(told.known, int):
+                    return begin, told.known
+                length = told.code
             return begin, length if self._stays(length) else None
         if isinstance(dimension, int) and isinstance(begin.known, int):
             return begin, dimension - begin.known

@@ -113,6 +113,11 @@ class Program:
         _, found = self._shared.get(kind.made, ("", {}))
         return {f: v.format(name) if isinstance(v, str) else v for f, v in found.items()}
 
+    def counted(self, kind: Tuple) -> str | None:
+        """The field of a port's struct that is as long as there are drones; None for what is no port's."""
+        _, found = self._shared.get(kind.made, ("", {}))
+        return next((name for name, length in found.items() if length == "{0}->n"), None)
+
     def number(self, value: float) -> str:
         """A number with a fraction."""
         if math.isnan(value):
