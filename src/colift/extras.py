@@ -36,4 +36,5 @@ def install(extra: str) -> str:
     """A command that installs the packages of an extra, by their own names, for this Python."""
     own = shutil.which("pip") == shutil.which("pip", path=str(Path(sys.executable).parent))
     pip = ["pip"] if own and shutil.which("pip") else [sys.executable, "-m", "pip"]
-    return shlex.join([*pip, "install", *requirements(extra)])
+    named = (text.partition(";")[0].strip() for text in requirements(extra))
+    return shlex.join([*pip, "install", *named])

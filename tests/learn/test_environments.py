@@ -219,3 +219,12 @@ def test_wrong_options_are_refused_by_name(options, told):
         one(**options)
     with pytest.raises(UnknownNameError, match="Fly"):
         one("Fly")
+
+
+def test_motors_of_drones_with_more_than_four_stand_where_the_mixer_has_them():
+    from colift.learn.worlds import Setting
+
+    setting = Setting.of("Hover", level="motors", changes={"drones.vehicle": "hexacopter-3kg"})
+    mission = setting.mission(0)
+    found = NUMBERS.view(setting.numbers(mission), "lever")[:, 0]
+    np.testing.assert_array_equal(found, 0.5 * mission.team.arms)

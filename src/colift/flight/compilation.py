@@ -26,7 +26,7 @@ STUDIES = (
     "colift.study.bench.timing", "colift.study.latency", "colift.study.rehearsal", "colift.study.safety", "colift.plan.planner",
     "colift.learn.kernels",
 )  # fmt: skip
-"""Modules with kernels that no flight calls, but a study."""
+"""Modules with kernels that no flight calls, but a study, the planner or a learner."""
 LONGEST = (("allocation", "safe"), ("supervision", "lift"))
 """Parts that take longest to compile: they come first, so that no process is left with one at the end."""
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

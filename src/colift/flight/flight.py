@@ -445,11 +445,7 @@ class Flight:
             elif not np.isfinite(leg.bus.row).all():
                 self.outcome = f"diverged before t = {self.time:g} s"
             elif lost := self._left():
-                self.membership.found += [(self.time, drone) for drone in lost]
-                if len(lost) < len(leg.drones):
-                    self.lose(lost)
-                else:
-                    self.outcome = f"no drone left to carry at t = {self.time:g} s"
+                self.leave(lost)
 
     def _left(self) -> list[int]:
         """Who has been judged lost, and is known to be by all that it concerns."""
@@ -459,6 +455,14 @@ class Flight:
             for place, drone in enumerate(leg.drones)
             if has_left(leg.bus, leg.circuit.leaderless, place)
         ]
+
+    def leave(self, lost: list[int]) -> None:
+        """Note that these drones were found to carry no more, and go on without them; where they are all, the flight ends."""
+        self.membership.found += [(self.time, drone) for drone in lost]
+        if len(lost) < len(self.drones):
+            self.lose(lost)
+        else:
+            self.outcome = f"no drone left to carry at t = {self.time:g} s"
 
     def lose(self, lost: list[int]) -> None:
         """Go on without these drones; if the others cannot hold the load in hover, bring it down."""

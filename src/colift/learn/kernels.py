@@ -33,6 +33,7 @@ from colift.learn.numbers import (
     RATES,
     TOUCHED,
 )  # fmt: skip
+from colift.world.actuation.motors import FORWARD, LEFT, SPIN
 
 Eyes = named_tuple(
     "Eyes",
@@ -58,8 +59,6 @@ LIMIT = 1e3
 """Observations are clipped to this."""
 FASTEST = 10.0
 """No speed counts for more, m/s."""
-_X, _Y, _SPIN = (1.0, -1.0, -1.0, 1.0), (1.0, 1.0, -1.0, -1.0), (1.0, -1.0, 1.0, -1.0)
-"""Where motors stand and how they turn their drone, as in :mod:`colift.world.actuation.motors`."""
 
 
 @intrinsic
@@ -130,9 +129,9 @@ def put(level, action, numbers, eyes):  # type: ignore[no-untyped-def]
             for j in range(4):
                 T = 0.25 * most * (1.0 + SPAN * within(action[4 * i + j]))
                 f += T
-                tau_x += numbers[o + N.lever] * _Y[j] * T
-                tau_y -= numbers[o + N.lever] * _X[j] * T
-                tau_z += numbers[o + N.ratio] * _SPIN[j] * T
+                tau_x += numbers[o + N.lever] * LEFT[j] * T
+                tau_y -= numbers[o + N.lever] * FORWARD[j] * T
+                tau_z += numbers[o + N.ratio] * SPIN[j] * T
             eyes.thrusts[i] = f
             eyes.torques[i, 0], eyes.torques[i, 1], eyes.torques[i, 2] = tau_x, tau_y, tau_z
 

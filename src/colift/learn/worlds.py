@@ -233,7 +233,7 @@ class Setting:
             rigid=float(team.body is not None), reach=task.reach, least_height=task.least_height, scale=NEAR_SCALE,
             gap=task.gap, boxes=float(len(task.boxes)), box=boxes.ravel(), **{name: task.weights[name] for name in TERMS},
             pull=-tensions[:, None] * start.directions, thrust=team.hover_forces(tensions, start.directions),
-            lever=motors.settled("arm_length", team) / np.sqrt(2.0), ratio=motors.settled("torque_ratio", team),
+            lever=motors.levers(team), ratio=motors.settled("torque_ratio", team),
             radius=np.where(np.isfinite(team.radii), team.radii, UNKNOWN_RADIUS * team.cable_lengths),
         )  # fmt: skip
 

@@ -173,8 +173,8 @@ def _beside(source: Path, table: Mapping[str, Any]) -> None:
         several = isinstance(vehicle, list)
         each = [found(name, ".toml") for name in (vehicle if several else [vehicle])]
         drones["vehicle"] = each if several else each[0]
-    if isinstance(reference, dict) and reference.get("kind") == "plan":
-        reference |= {"file": found(reference["file"], "")} if "file" in reference else {}
+    if isinstance(reference, dict) and reference.get("kind") == "plan" and "file" in reference:
+        reference["file"] = found(reference["file"], "")
 
 
 def _drop_old_vehicle(table: dict[str, Any], path: str, value: Any, given: set[str]) -> None:

@@ -88,7 +88,7 @@ def _allocate(now, sees, params, memory, writes):  # type: ignore[no-untyped-def
             for k in range(3):
                 room += memory[p + k] * memory[a + k]
             if room + more < 0.0:
-                part = min(part, max(room, 0.0) / max(room - (room + more), 1e-300))
+                part = min(part, max(room, 0.0) / max(-more, 1e-300))
         share = part
         for i in range(n):
             o = M.rows + M.width * i

@@ -275,9 +275,5 @@ class SitlFlight:
         """Go on without drones whose autopilots have been silent for long enough."""
         for drone in drones:
             self._silent[drone] += 0.0 if self.autopilots[drone].alive else self._dt
-        carrying = (self._silent[drones] <= SILENCE).astype(float)
-        if not carrying.all() and carrying.any():
-            flight = self.flight
-            lost = [drone for drone, carries in zip(drones, carrying, strict=True) if not carries]
-            flight.membership.found += [(flight.time, drone) for drone in lost]
-            flight.lose(lost)
+        if lost := [drone for drone in drones if self._silent[drone] > SILENCE]:
+            self.flight.leave(lost)

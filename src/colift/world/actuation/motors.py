@@ -38,9 +38,9 @@ OF_DRONES = {
 """Settings here, by the field of the drones that says the same of all four motors."""
 
 # Motors stand at (x, y) = arm / sqrt(2) times these, and turn their drone about z by the third.
-_X = (1.0, -1.0, -1.0, 1.0)
-_Y = (1.0, 1.0, -1.0, -1.0)
-_SPIN = (1.0, -1.0, 1.0, -1.0)
+FORWARD = (1.0, -1.0, -1.0, 1.0)
+LEFT = (1.0, 1.0, -1.0, -1.0)
+SPIN = (1.0, -1.0, 1.0, -1.0)
 
 _ROUNDING = 1e-9  # N, by which a thrust may miss its limits before the mixer gives something up
 
@@ -68,9 +68,9 @@ def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[n
     fits = True
     least, most = math.inf, -math.inf
     for j in range(4):
-        out[j] = 0.25 * (_Y[j] * tau_x - _X[j] * tau_y) / lever
+        out[j] = 0.25 * (LEFT[j] * tau_x - FORWARD[j] * tau_y) / lever
         least, most = min(least, out[j]), max(most, out[j])
-        exact = 0.25 * f + out[j] + _SPIN[j] * yaw
+        exact = 0.25 * f + out[j] + SPIN[j] * yaw
         fits = fits and low - _ROUNDING <= exact <= high + _ROUNDING
     common, shrink, share = 0.25 * f, 1.0, 1.0
     if not fits:
@@ -79,14 +79,14 @@ def mix(f, tau_x, tau_y, tau_z, lever, ratio, low, high, out):  # type: ignore[n
         shrink = min(shrink, (common - low) / max(-least, 1e-300))
         common = min(common, high - shrink * most)
         for j in range(4):
-            step = _SPIN[j] * yaw
+            step = SPIN[j] * yaw
             held = common + shrink * out[j]
             if step > 0.0:
                 share = min(share, max(high - held, 0.0) / step)
             elif step < 0.0:
                 share = min(share, max(held - low, 0.0) / -step)
     for j in range(4):
-        out[j] = min(max(common + shrink * out[j] + share * _SPIN[j] * yaw, low), high)
+        out[j] = min(max(common + shrink * out[j] + share * SPIN[j] * yaw, low), high)
     return fits
 
 
@@ -128,9 +128,9 @@ def _turn(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             memory[o + M.thrust + j] = T
             acting = motor_health[i, j] * max(T + memory[o + M.noise + j], 0.0)
             f += acting
-            tau_x += (lever * _Y[j] - params[P.offset + 1]) * acting
-            tau_y -= (lever * _X[j] - params[P.offset]) * acting
-            tau_z += ratio * _SPIN[j] * acting
+            tau_x += (lever * LEFT[j] - params[P.offset + 1]) * acting
+            tau_y -= (lever * FORWARD[j] - params[P.offset]) * acting
+            tau_z += ratio * SPIN[j] * acting
         applied_thrusts[i] = f
         applied_torques[i, 0] = tau_x
         applied_torques[i, 1] = tau_y
@@ -211,7 +211,7 @@ class Motors(ActuationPart):
         Motors are numbered front left, rear left, rear right, front right, x forward and y left.
         """
         levers, ratios = self.levers(team), self.settled("torque_ratio", team)
-        arms = np.array([_Y, [-x for x in _X], _SPIN])
+        arms = np.array([LEFT, [-x for x in FORWARD], SPIN])
         torques = motors @ arms.T * np.stack([levers, levers, ratios], axis=1)
         return motors.sum(axis=1), torques
 
