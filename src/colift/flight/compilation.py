@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-import json
-import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,23 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from colift import catalogue
-from colift.part import find
+from colift.mission import crew
 
 Progress = Callable[[float, str], None]
 """Called with the share that is done, between 0 and 1, and the name of what comes next."""
 
-FLIGHT = ("colift.flight.loop", "colift.control.reference.descent")
-"""Modules with kernels that any flight may call."""
 STUDIES = (
     "colift.study.bench.timing", "colift.study.latency", "colift.study.rehearsal", "colift.study.safety", "colift.plan.planner",
     "colift.learn.kernels",
 )  # fmt: skip
 """Modules with kernels that no flight calls, but a study, the planner or a learner."""
-LONGEST = (("allocation", "safe"), ("supervision", "lift"))
-"""Parts that take longest to compile: they come first, so that no process is left with one at the end."""
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-Step = tuple[str, ...]
-"""A module to import, or layer and kind of a part to find; either compiles what is not in the cache."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +85,7 @@ def warm(
         with jit.told_of_compilation(tell):
             for number, step in enumerate(steps):
                 share = number / len(steps)
-                _take(step)
+                crew.take(step)
             if mission is not None:
                 _load(_table(mission), changes)
     compiled += [kernel for kernel in theirs if kernel not in compiled]
@@ -107,76 +96,33 @@ def warm(
 
 
 @contextmanager
-def _helpers(steps: Sequence[Step]) -> Iterator[tuple[Callable[[], None], list[str]]]:
-    """When the function is called for the first time, other processes begin to take the same steps, one a core.
-
-    They begin elsewhere or from the end. No two compile the same kernel at the same time
-    (:mod:`colift.kernel.jit`), so they meet where nothing is left to do. The list has, in the end, what they compiled.
-    """
-    processes: list[subprocess.Popen[str]] = []
+def _helpers(steps: Sequence[crew.Step]) -> Iterator[tuple[Callable[[], None], list[str]]]:
+    """When the function is called for the first time, other processes begin. The list has, in the end, what they compiled."""
+    started: list[subprocess.Popen[str]] = []
     theirs: list[str] = []
 
     def call() -> None:
-        if processes or len(steps) < 2:
-            return
-        paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
-        for number in range(1, CORES):
-            begin = number // 2 * 2 * len(steps) // CORES
-            order = [*steps[begin:], *steps[:begin]]
-            if number % 2:
-                order.reverse()
-            code = f"from {__name__} import help_; help_({json.dumps(order)})"
-            process = subprocess.Popen(
-                [sys.executable, "-c", code],
-                env={**os.environ, "PYTHONPATH": paths},
-                text=True,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-            )
-            processes.append(process)
+        if not started and len(steps) > 1:
+            started.extend(crew.processes(steps, subprocess.PIPE))
 
     try:
         yield call, theirs
     finally:
-        for process in processes:
+        for process in started:
             process.terminate()
             theirs += process.communicate()[0].split()
 
 
-def help_(steps: Sequence[Step]) -> None:
-    """Take these steps, and print the name of every kernel that has to be compiled."""
-    from colift.kernel import jit
-
-    with jit.told_of_compilation(lambda kernel: print(kernel, flush=True)):
-        for step in steps:
-            _take(step)
-
-
-def _take(step: Step) -> None:
-    if len(step) == 1:
-        importlib.import_module(*step)
-    else:
-        find(*step)
-
-
-def _steps(mission: Any, allocator: str | None) -> tuple[list[Step], dict[str, Any]]:
+def _steps(mission: Any, allocator: str | None) -> tuple[list[crew.Step], dict[str, Any]]:
     """What is to be imported, the longest first, and what changes in the mission."""
     if mission is None and allocator is not None:
         return [("allocation", allocator)], {}
-    changes: dict[str, Any] = {}
     if mission is None:
         parts = [(layer, kind) for layer in catalogue.FOLDERS for kind in catalogue.names(layer)]
-        modules = [*FLIGHT, *STUDIES]
-    else:
-        parts, modules = [*_parts(_table(mission))], [*FLIGHT]
-        if allocator is not None:
-            parts.insert(0, ("allocation", allocator))
-            changes["allocation.kind"] = allocator
-    known = [part for part in dict.fromkeys(parts) if part[1] in catalogue.names(part[0])]
-    first = [part for part in known if part in LONGEST]
-    rest = [part for part in known if part not in LONGEST]
-    return [*first, *((name,) for name in modules), *rest], changes
+        return crew.ordered(parts, [*crew.FLIGHT, *STUDIES]), {}
+    if allocator is None:
+        return crew.steps_of(_table(mission)), {}
+    return crew.steps_of(_table(mission), ("allocation", allocator)), {"allocation.kind": allocator}
 
 
 def _load(table: dict[str, Any], changes: dict[str, Any]) -> None:
@@ -191,23 +137,3 @@ def _table(mission: Any) -> dict[str, Any]:
         return dict(mission)
     resolved = getattr(mission, "resolved", None)
     return resolved() if resolved else catalogue.read_source(mission)[1]
-
-
-def _parts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Layer and kind of the parts that a mission's table asks for, also of those that its events put in place."""
-    sections = [(layer, table.get(layer, {})) for layer in catalogue.LAYERS]
-    sections += [(name, item) for name in catalogue.LISTS for item in _list(table.get(name))]
-    for event in _list(table.get("events")):
-        if isinstance(event, Mapping):
-            layer, _, leaf = str(event.get("field")).partition(".")
-            value = event.get("value")
-            sections.append((layer, {"kind": value} if leaf == "kind" else value))
-    for layer, section in sections:
-        if layer in catalogue.FOLDERS and isinstance(section, Mapping):
-            kind = section.get("kind", catalogue.default_kind(layer, table))
-            if isinstance(kind, str):
-                yield layer, kind
-
-
-def _list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else []

@@ -25,7 +25,7 @@ from colift.catalogue import LAYERS
 from colift.control.allocation.base import INFO_SIZE, Status
 from colift.errors import ColiftError
 from colift.flight import agents
-from colift.kernel.by_reference import signals_type
+from colift.kernel.by_reference import named_signals, signals_type
 from colift.kernel.jit import f8, i8, kernel, matrix, monotonic_ns
 from colift.kernel.load import add_arms, add_wanted_arms, ends_of, is_rigid
 from colift.kernel.math.leaning import leaned
@@ -45,7 +45,7 @@ FUNCTIONS = {
 
 Wires = named_tuple("Wires", FUNCTIONS, __name__)
 """One :class:`~colift.kernel.ports.Wire` a port."""
-Common = named_tuple(
+Common = named_signals(
     "Common",
     [
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces", "external_moment",

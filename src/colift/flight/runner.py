@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from colift.flight.flight import Flight, Progress
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
 from colift.record import metrics
 from colift.record.recorded import RecordedMission
 from colift.record.recording import Recording
 from colift.record.verdict import Verdict, judge
+
+if TYPE_CHECKING:
+    from colift.flight.flight import Progress
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,10 @@ def run(
     for name, value in settings.items():
         path = name.replace("__", ".") if "__" in name else f"allocation.{name}"
         changes[path] = value
-    flight = Flight(load_mission(mission, layered(changes, overrides or {})))
+    loaded = load_mission(mission, layered(changes, overrides or {}))
+    # After it, so that at the first use all cores compile what the mission needs beside the loop.
+    from colift.flight.flight import Flight
+
+    flight = Flight(loaded)
     recording = flight.run(progress)
     return Run(recording=recording, loop_time=flight.loop_time, compiled=flight.compiled)

@@ -6,9 +6,12 @@ kernels take, and each signal that is added to a port would cost all of its kern
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -24,6 +27,12 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+from numba.np.numpy_support import as_dtype
+
+
+def named_signals(name: str, fields: Iterable[str], module: str) -> Any:
+    """A class of named tuples of arrays, found again in ``module`` under its name, as the cache of kernels needs it."""
+    return type(name, (_Place, namedtuple(name, tuple(fields))), {"__module__": module})
 
 
 class Signals(types.Type):
@@ -43,9 +52,41 @@ class Signals(types.Type):
         return Conversion.safe if getattr(other, "instance_class", None) is self.made else None
 
 
+class _Place:
+    """Of a tuple of arrays where compiled code finds them."""
+
+    _each: tuple[Any, ...]
+
+    @cached_property
+    def _words(self) -> Any:
+        """What Numba keeps of each array: nobody who counts references, length, size of an item, place, shape and strides."""
+        words: list[int] = []
+        for name, array, wanted in zip(self._fields, self, self._each, strict=True):  # type: ignore[attr-defined, call-overload]
+            dtype = as_dtype(wanted.dtype)
+            if not (
+                isinstance(array, np.ndarray)
+                and (array.dtype, array.ndim, array.flags.c_contiguous)
+                == (dtype, wanted.ndim, True)
+            ):
+                raise TypeError(
+                    f"{type(self).__name__}.{name}: {wanted.ndim} dimensions of {dtype}, contiguous, are wanted"
+                )
+            place = array.__array_interface__["data"][0]
+            words += (0, 0, array.size, array.itemsize, place, *array.shape, *array.strides)
+        return np.array(words, np.intp)
+
+    @cached_property
+    def _place(self) -> int:
+        return int(self._words.__array_interface__["data"][0])
+
+    def __getstate__(self) -> None:
+        """A copy has arrays of its own, and so a place of its own."""
+
+
 def signals_type(made: Any, each: Iterable[Any]) -> Signals:
     """The type of a class of named tuples whose fields are arrays of these types; that is what Numba takes each for from now on."""
     found = Signals(made, each)
+    made._each = found.each
 
     def typeof(value: Any, context: Any) -> Any:
         return found
@@ -82,9 +123,15 @@ def _put(context: Any, builder: Any, signals: Signals, value: Any) -> Any:
 
 @unbox(Signals)  # type: ignore[untyped-decorator]
 def _unbox(typ: Signals, obj: Any, c: Any) -> Any:
-    by_value = c.unbox(typ.value, obj)
-    place = _put(c.context, c.builder, typ, by_value.value)
-    return NativeValue(place, is_error=by_value.is_error, cleanup=by_value.cleanup)
+    # The tuple says where it stands: to take each array out of its Python object here would be most of a small kernel's code.
+    pointer = c.context.get_value_type(typ)
+    place = cgutils.alloca_once_value(c.builder, cgutils.get_null_value(pointer))
+    number = c.pyapi.object_getattr_string(obj, "_place")
+    missing = cgutils.is_null(c.builder, number)
+    with c.builder.if_then(c.builder.not_(missing), likely=True):
+        c.builder.store(c.builder.inttoptr(c.pyapi.long_as_ulonglong(number), pointer), place)
+        c.pyapi.decref(number)
+    return NativeValue(c.builder.load(place), is_error=missing)
 
 
 @lower_cast(types.BaseNamedTuple, Signals)  # type: ignore[untyped-decorator]

@@ -73,6 +73,7 @@ def kernel(signature: Any, *, counted: bool = True) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         njit: Any = numba.njit
         options = {"nogil": True, "error_model": "numpy", "fastmath": _FASTMATH, "_nrt": counted}
+        options |= {"no_cfunc_wrapper": True}  # others call it by the address of its code
         compiled = njit(**options)(function)
         if JIT_ENABLED:
             with _cache_for(function):
@@ -121,22 +122,23 @@ def name_of(function: Callable[..., Any]) -> str:
 
 
 @contextmanager
-def told_of_compilation(begin: Callable[[str], None]) -> Iterator[None]:
-    """Call ``begin`` with the name of every kernel of the block that is compiled, not loaded from the cache."""
-    with event.install_listener("numba:compile", _Listener(begin)):
+def told_of_compilation(begin: Callable[[str], None], *, own: bool = False) -> Iterator[None]:
+    """Call ``begin`` with the name of every kernel of the block that is compiled, not loaded from the cache; or of colift's own."""
+    with event.install_listener("numba:compile", _Listener(begin, own)):
         yield
 
 
 class _Listener(event.Listener):
     """Hears when Numba compiles; what is compiled for the sake of a kernel is a part of it."""
 
-    def __init__(self, begin: Callable[[str], None]) -> None:
-        self._begin = begin
+    def __init__(self, begin: Callable[[str], None], own: bool) -> None:
+        self._begin, self._own = begin, own
         self._depth = 0
 
     def on_start(self, event: Any) -> None:
-        if self._depth == 0:
-            self._begin(name_of(event.data["dispatcher"].py_func))
+        function = event.data["dispatcher"].py_func
+        if self._depth == 0 and (_is_ours(function) or not self._own):
+            self._begin(name_of(function))
         self._depth += 1
 
     def on_end(self, event: Any) -> None:

@@ -27,9 +27,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from colift.kernel.by_reference import signals_type
+from colift.kernel.by_reference import named_signals, signals_type
 from colift.kernel.jit import address_of, f8, i8, u1, vector, void
-from colift.kernel.signals import HIDDEN, LEGEND, OF_ONE, Signal, named_tuple
+from colift.kernel.signals import HIDDEN, LEGEND, OF_ONE, Signal
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def _words(name: str) -> str:
 
 
 def _tuple(name: str, signals: Iterable[str]) -> Any:
-    globals()[name] = made = named_tuple(name, signals, __name__)
+    globals()[name] = made = named_signals(name, signals, __name__)
     return made
 
 

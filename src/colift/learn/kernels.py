@@ -16,11 +16,10 @@ from numba.extending import intrinsic
 
 from colift.flight.loop import SIGNATURE as LOOP
 from colift.flight.loop import advance
-from colift.kernel.by_reference import signals_type
+from colift.kernel.by_reference import named_signals, signals_type
 from colift.kernel.jit import i8, inline, kernel, matrix, tensor, vector, void
 from colift.kernel.math import noise, quaternion
 from colift.kernel.ports import type_of
-from colift.kernel.signals import named_tuple
 from colift.learn.numbers import (
     BELOW,
     CABLES,
@@ -35,7 +34,7 @@ from colift.learn.numbers import (
 )  # fmt: skip
 from colift.world.actuation.motors import FORWARD, LEFT, SPIN
 
-Eyes = named_tuple(
+Eyes = named_signals(
     "Eyes",
     [
         "row", "load", "load_attitude", "load_rates", "reference", "reference_attitude", "reference_rates", "force", "moment",

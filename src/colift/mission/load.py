@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from colift.catalogue import FOLDERS, LAYERS, LISTS, default_kind, read_source
 from colift.errors import MissionError, Problem, SettingError, UnknownNameError
 from colift.mission.checks import cross_checks, hover_checks
+from colift.mission.crew import on_all_cores
 from colift.mission.mission import Mission
 from colift.mission.planned import planned_checks
 from colift.mission.schema import Frame
@@ -70,7 +71,8 @@ def load_mission(
             problems.append(problem)
     if "timing.delay" in given or "timing" in given:
         _follow_delay(table, delay, given)
-    mission = _validate(table, problems, must_fly)
+    with on_all_cores(table):
+        mission = _validate(table, problems, must_fly)
     if problems or mission is None:
         raise MissionError(label, problems)
     return mission

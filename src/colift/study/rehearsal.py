@@ -15,10 +15,10 @@ from colift.control.allocation.base import AllocatorPart
 from colift.control.allocation.limits.feasibility import widest_formation
 from colift.control.allocation.safe import Safe
 from colift.flight import agents
-from colift.kernel.by_reference import signals_type
+from colift.kernel.by_reference import named_signals, signals_type
 from colift.kernel.jit import f8, i8, kernel, matrix, tensor, void
 from colift.kernel.ports import PORTS, type_of
-from colift.kernel.signals import make_bus, named_tuple
+from colift.kernel.signals import make_bus
 from colift.team import Team
 from colift.team.geometry import Array, pairwise_angles, ring
 from colift.team.scaling import scaled_load
@@ -29,8 +29,8 @@ DT = 0.01
 """Cycle, s."""
 RUNS, RESTARTS, STALLS = 0.0, 1.0, 2.0
 """What happens to an agent in a cycle: it decides; it forgets everything before; it neither decides nor speaks."""
-Desk = named_tuple("Desk", agents.SIGNALS, __name__)
-Table = named_tuple(
+Desk = named_signals("Desk", agents.SIGNALS, __name__)
+Table = named_signals(
     "Table", ("force", "reference", "received_tensions", "received_directions"), __name__
 )
 _allocate, _transmit = PORTS["allocation"].invoke, PORTS["link"].invoke
