@@ -317,6 +317,7 @@ class FieldTable(SphinxDirective):
     sections: ClassVar[dict[str, str]] = {
         "world": "World",
         "world.ground": "Ground",
+        "world.obstacles": "Obstacle",
         "load": "Load",
         "drones": "Drones",
         "truth": "Truth",

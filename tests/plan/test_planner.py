@@ -11,9 +11,10 @@ from windows import window
 
 from colift.errors import MissionError, PlanError
 from colift.plan import planner
-from colift.plan.distances import CYLINDER, along, distance
+from colift.plan.distances import along, distance
 from colift.plan.problem import assemble
 from colift.plan.scene import load_scene
+from colift.team.obstacles import CYLINDER
 from terminal import colift
 
 

@@ -63,13 +63,13 @@ def test_metrics_and_report_take_the_gap(tmp_path):
     run = flown("paper-spiral", (3.0, 3), allocator="ring")
     unknown = {name for name, value in run.metrics.items() if not np.isfinite(value)}
     # Short; nothing to detect; rods push when the drone leaves, where cables would have caught; no limit of thrust; no
-    # distance asked for above each other; nothing is lifted off the ground; a point has no attitude.
+    # distance asked for above each other; nothing is lifted off the ground or in the way; a point has no attitude.
     lifts = {
         "dragged_m", "lift_peak", "placement_m", "setbacks", "touch_height_m", "touch_peak", "weighed_mass_kg",
     }  # fmt: skip
     assert unknown == lifts | {
         "tension_integral_10s_Ns", "detection_delay_s", "max_catch_impulse_Ns", "peak_thrust_fraction",
-        "min_downwash_distance_m", "min_load_distance_m", "attitude_rms_deg", "attitude_max_deg", "yaw_max_deg",
+        "min_downwash_distance_m", "min_load_distance_m", "min_clearance_m", "attitude_rms_deg", "attitude_max_deg", "yaw_max_deg",
         "max_missing_moment_Nm",
     }  # fmt: skip
     assert write_report(run.recording, tmp_path, metrics=run.metrics).stat().st_size > 1e4

@@ -44,6 +44,8 @@ export interface FlightInfo {
   body: Body | null;
   /** Height of the ground, m, where there is one. */
   ground: number | null;
+  /** What stands in the way: rows of eight numbers (colift.team.obstacles). */
+  obstacles: number[][];
   /** Least angle that was asked for, if any was. */
   safe_angle_deg: number | null;
   /** Least distance of two drones that was asked for, if any was, m. */

@@ -22,6 +22,7 @@ export interface Palette {
   wash: string;
   body: string;
   load: string;
+  obstacle: string;
 }
 
 const DARK: Palette = {
@@ -44,6 +45,7 @@ const DARK: Palette = {
   wash: "#7fb2ff",
   body: "#c9d2da",
   load: "#d9a066",
+  obstacle: "#8d7f9e",
 };
 
 const LIGHT: Palette = {
@@ -66,6 +68,7 @@ const LIGHT: Palette = {
   wash: "#3f7fd0",
   body: "#3c4650",
   load: "#8a5a2b",
+  obstacle: "#75678a",
 };
 
 export const DASHES: number[][] = [[], [7, 3], [2, 2], [8, 3, 2, 3], [12, 3], [4, 2, 1, 2], [3, 5], [12, 2, 2, 2]];

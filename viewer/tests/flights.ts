@@ -17,6 +17,7 @@ export function info(n: number, changes: Partial<FlightInfo> = {}): FlightInfo {
     safe_angle_deg: null,
     safe_distance: null,
     ground: 0,
+    obstacles: [],
     weight: 2,
     thrust: 5,
     facts: {},

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from colift.cli.base import Json, JsonFile, app, console, emit, loading, progress, save_json
+
+if TYPE_CHECKING:
+    from colift.plan.planner import Plan
 
 
 @app.command()
@@ -23,6 +26,12 @@ def plan(
         float, typer.Option(help="Look for shorter plans no longer than this, s.", min=0, max=3600)
     ] = 3.0,
     attempts: Annotated[int, typer.Option(help="Guesses at most.", min=1, max=10_000)] = 12,
+    room: Annotated[
+        float,
+        typer.Option(
+            help="Kept beyond all radii, for what a flight is off its plan, m.", min=0, max=10
+        ),
+    ] = 0.0,
     npz: Annotated[
         Path | None, typer.Option("--npz", help="Write the trajectory here, sampled at 1 kHz.")
     ] = None,
@@ -47,9 +56,11 @@ def plan(
     if drones is not None and drones != len(found.lengths):
         found = replace(found, directions=None, lengths=np.full(drones, found.lengths[0]))
     with progress("Planning") as advance:
-        best = planner.plan(found, seed=seed, seconds=seconds, attempts=attempts, progress=advance)
+        best = planner.plan(
+            found, planner.Limits(room=room), seed=seed, seconds=seconds, attempts=attempts, progress=advance
+        )  # fmt: skip
     result: dict[str, Any] = {
-        "scene": found.name, "drones": len(found.lengths), "seed": seed, "duration": best.duration, "excess": best.excess,
+        "scene": found.name, "drones": len(found.lengths), "seed": seed, "room": room, "duration": best.duration, "excess": best.excess,
         "guess": best.guess, "start_moved_deg": best.moved_deg, "first_s": best.first, "total_s": best.total,
     }  # fmt: skip
     if npz is not None:
@@ -62,8 +73,14 @@ def plan(
     if as_json:
         emit(result)
         return
+    _tell(best)
+
+
+def _tell(best: Plan) -> None:
+    """The plan in a few lines."""
+    name, n = best.scene.name, len(best.scene.lengths)
     out = console()
-    out.print(f"{found.name}, {len(found.lengths)} drones: {best.duration:.3f} s", highlight=False)
+    out.print(f"{name}, {n} drones: {best.duration:.3f} s", highlight=False)
     for kind, value in best.excess.items():
         out.print(f"  {kind:>10}  {-value:.4g} to its limit", highlight=False)
     if best.moved_deg > 0.5:

@@ -35,6 +35,7 @@ from colift.record.recording import Recording
 from colift.team import Team, contact
 from colift.team.geometry import matrix_of, min_norm_tensions, widest_gap, zero_yaw_quaternion
 from colift.team.load import from_to
+from colift.team.obstacles import Bodies, corners, first_touch
 from colift.team.plan import shares
 from colift.wording import numbers
 from colift.world.disturbance.base import DisturbancePart
@@ -86,6 +87,7 @@ class Flight:
             enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
         )
         self._disturbances: dict[int, DisturbancePart] = dict(winds_first)
+        self._obstacles = mission.world.rows()
         self._load_mass = mission.true_bodies.load_mass
         self._due: list[tuple[int, Due]] = sorted(timetable(mission), key=lambda item: item[0])
         self._legs: list[Leg] = []
@@ -499,10 +501,11 @@ class Flight:
         self._step = reached
 
     def _first_contact(self) -> tuple[int, str] | None:
-        """Step and words of the first contact that the last stretch recorded; of drones whose radii are known."""
-        leg = self._legs[-1]
+        """Step and words of the first contact that the last stretch recorded; of drones whose radii are known, and of obstacles."""
+        leg, obstacles = self._legs[-1], self._obstacles
         team = self.mission.true_team.of(leg.drones)
-        if not contact.watched(team.radii):
+        watched = contact.watched(team.radii)
+        if not (watched or len(obstacles)):
             return None
         (first, _, log, _), where, period = (
             leg.stretches[-1],
@@ -510,21 +513,26 @@ class Flight:
             self._every.recording,
         )
         positions = log[:, where["positions"]].reshape(len(log), team.n, 3)
-        found = contact.first_contact(
-            team.radii,
-            team.cable_lengths + log[:, where["reeled"]].reshape(len(log), team.n, 3)[:, :, 0],
-            positions,
-            self._ends(log, team)[:, :, 0],
-            log[:, where["attached"]],
-            None
-            if team.body is None
-            else contact.Boxes(
-                team.body.size, log[:, where["load"]][:, :3], log[:, where["load_attitude"]]
-            ),
-        )
-        if found is None:
+        load, attached = log[:, where["load"]][:, :3], log[:, where["attached"]]
+        ends, boxes = self._ends(log, team)[:, :, 0], None
+        if team.body is not None:
+            boxes = contact.Boxes(team.body.size, load, log[:, where["load_attitude"]])
+        found = []
+        if watched:
+            reeled = log[:, where["reeled"]].reshape(len(log), team.n, 3)[:, :, 0]
+            lengths = team.cable_lengths + reeled
+            found.append(
+                contact.first_contact(team.radii, lengths, positions, ends, attached, boxes)
+            )
+        if len(obstacles):
+            points = (
+                load[:, None] if boxes is None else corners(*boxes[:1], load[:, None], boxes[2])
+            )
+            touch = first_touch(obstacles, Bodies(team.radii, positions, ends, attached, points))
+            found.append(None if touch is None else touch[:2])
+        row, text = min((each for each in found if each is not None), default=(-1, ""))
+        if row < 0:
             return None
-        row, text = found
         return (-(-first // period) + row) * period, text.format(*leg.drones)
 
     def _ends(self, log: NDArray[np.float64], team: Team) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from colift.control.allocation.base import AllocatorPart
 from colift.control.allocation.limits.hover import hovering
+from colift.control.reference.base import ReferencePart
 from colift.control.supervision.base import SupervisionPart
 from colift.errors import Problem, UnknownNameError
 from colift.kernel.math import winch
@@ -24,6 +25,8 @@ from colift.mission.grounding import ground_checks
 from colift.mission.schema import Event, Frame, Section, Timing
 from colift.part import KIND, Declaration, Declared, Part, find, kind_of, placed
 from colift.team import Team, contact
+from colift.team.geometry import matrix_of
+from colift.team.obstacles import Bodies, corners, first_touch
 from colift.wording import parse, problems_of, shown
 from colift.world.actuation.base import ActuationPart
 from colift.world.fault.base import FaultPart
@@ -88,6 +91,7 @@ def cross_checks(
                 yield Problem(placed(path, field), _of_drones(frame, field), message)
         if must_fly and not weak:
             yield from list(_touching(frame, broken)) or _start_checks(frame, parts, broken)
+            yield from _obstructed(frame, parts, broken)
     if "timing" not in broken:
         for path, part in _with_paths(parts, lists):
             for field, message in part.check_timing(timing.step, timing.duration):
@@ -204,6 +208,35 @@ def _touching(frame: Frame, broken: set[str]) -> Iterable[Problem]:
         value = f"{math.degrees(frame.start_cone):g}" if given is None else ""
         message = f"must leave the drones (drones.radius) apart: {found[1].format(*drones)}"
         yield Problem(f"start.{field}", value, message.replace("touched", "touch"))
+
+
+def _obstructed(frame: Frame, parts: Mapping[str, Part], broken: set[str]) -> Iterable[Problem]:
+    """An obstacle that the team touches before anything moves."""
+    obstacles, reference = frame.world.rows(), parts.get("reference")
+    given, drones = frame.start.directions, frame.first_drones()
+    fits = given is None or len(given) == frame.drones.count
+    if not (len(obstacles) and isinstance(reference, ReferencePart) and fits) or "start" in broken:
+        return
+    team = frame.team.of(drones)
+    (first, *_), attitude, _ = reference.pose(team)
+    load = first + frame.start.load_offset
+    if frame.start.on_ground and frame.ground is not None:
+        load[2] = frame.ground.height + frame.sole
+    arms = np.zeros((team.n, 3)) if team.body is None else team.body.attachments
+    ends = load + arms @ matrix_of(attitude).T
+    positions = frame.start_places(load)
+    if positions is None:
+        positions = ends - team.cable_lengths[:, None] * frame.start_directions()
+    points = load[None, None]
+    if team.body is not None:
+        points = corners(team.body.size, points, attitude[None])
+    touch = first_touch(
+        obstacles, Bodies(team.radii, positions[None], ends[None], np.ones((1, team.n)), points)
+    )
+    if touch is not None:
+        who, _, _ = touch.text.format(*drones).partition(" touched ")
+        path = f"world.obstacles.{touch.obstacle}"
+        yield Problem(path, "", f"must leave room for the team at the start: {who} touches it")
 
 
 def _box(team: Team) -> contact.Boxes | None:

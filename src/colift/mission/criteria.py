@@ -29,6 +29,7 @@ METRICS = (
     Metric("min_downwash_distance_m", "m", "the same with heights as parts of the allocator's downwash: room above each other counts less"),
     Metric("min_cable_distance_m", "m", "smallest distance from the centre of a drone to another's cable, taken as straight, at any time"),
     Metric("min_load_distance_m", "m", "smallest distance from the centre of a drone to the box around a rigid load at any time"),
+    Metric("min_clearance_m", "m", "smallest room between an obstacle and a drone, taken as a ball, its cable, taken as straight, or the load, at any time"),
     Metric("max_tilt_deg", "deg", "largest tilt of a drone that nothing has broken, its thrust axis from the vertical"),
     Metric("peak_thrust_fraction", "1", "largest thrust of a drone as a share of the most that it can give"),
     Metric("peak_total_tension_N", "N", "largest simultaneous sum of tensions, between recorded rows too"),

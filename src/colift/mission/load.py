@@ -14,11 +14,19 @@ from typing import Any
 from pydantic import ValidationError
 
 from colift.catalogue import FOLDERS, LAYERS, LISTS, default_kind, read_source
-from colift.errors import MissionError, Problem, SettingError, UnknownNameError
+from colift.errors import (
+    MissingExtraError,
+    MissionError,
+    Problem,
+    SceneError,
+    SettingError,
+    UnknownNameError,
+)
 from colift.mission.checks import cross_checks, hover_checks
 from colift.mission.crew import on_all_cores
 from colift.mission.mission import Mission
 from colift.mission.planned import planned_checks
+from colift.mission.scenes import obstacle_of, obstacles_of, read_scene
 from colift.mission.schema import Frame
 from colift.part import KIND, Declaration, Declared, Part, find, names
 from colift.team.vehicles import NUMBERS
@@ -71,6 +79,7 @@ def load_mission(
             problems.append(problem)
     if "timing.delay" in given or "timing" in given:
         _follow_delay(table, delay, given)
+    _with_scene(table, problems)
     with on_all_cores(table):
         mission = _validate(table, problems, must_fly)
     if problems or mission is None:
@@ -161,7 +170,7 @@ def _follow_delay(table: dict[str, Any], before: Any, given: set[str]) -> None:
 
 
 def _beside(source: Path, table: Mapping[str, Any]) -> None:
-    """Take files that a mission's file names, of vehicles and of a plan, from its own folder."""
+    """Take files that a mission's file names, of vehicles, of a plan and of a scene, from its own folder."""
     if not source.is_file():
         return
 
@@ -169,7 +178,9 @@ def _beside(source: Path, table: Mapping[str, Any]) -> None:
         is_file = isinstance(name, str) and name.endswith(ending)
         return str(source.parent / name) if is_file else name
 
-    drones, reference = table.get("drones"), table.get("reference")
+    drones, reference, world = (table.get(name) for name in ("drones", "reference", "world"))
+    if isinstance(world, dict) and "scene" in world:
+        world["scene"] = found(world["scene"], "")
     if isinstance(drones, dict) and drones.get("vehicle") is not None:
         vehicle = drones["vehicle"]
         several = isinstance(vehicle, list)
@@ -177,6 +188,27 @@ def _beside(source: Path, table: Mapping[str, Any]) -> None:
         drones["vehicle"] = each if several else each[0]
     if isinstance(reference, dict) and reference.get("kind") == "plan" and "file" in reference:
         reference["file"] = found(reference["file"], "")
+
+
+def _with_scene(table: dict[str, Any], problems: list[Problem]) -> None:
+    """Put the obstacles of the scene that a mission names before its own."""
+    world = table.get("world")
+    if not (isinstance(world, dict) and isinstance(world.get("scene"), str)):
+        return
+    name = world.pop("scene")
+    mistakes: list[Problem] = []
+    try:
+        rows = obstacles_of(read_scene(Path(name)), mistakes).tolist()
+    except SceneError as error:
+        mistakes, rows = list(error.problems), []
+    except MissingExtraError as error:
+        mistakes, rows = [Problem("", "", str(error))], []
+    problems.extend(
+        Problem("world.scene", name, f"{each.path} {each.message}".strip()) for each in mistakes
+    )
+    own = world.get("obstacles", [])
+    if isinstance(own, list) and not mistakes:
+        world["obstacles"] = [obstacle_of(row) for row in rows] + own
 
 
 def _drop_old_vehicle(table: dict[str, Any], path: str, value: Any, given: set[str]) -> None:

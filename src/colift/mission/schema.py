@@ -26,6 +26,7 @@ from colift.team import Body, Team, vehicles
 from colift.team import Ground as GroundBelow
 from colift.team.geometry import Array, ring, ring_cone
 from colift.team.load import box_inertia, flaw_of, usual_attachments
+from colift.team.obstacles import BOX, CYLINDER, WIDTH
 from colift.team.plan import plan
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -110,6 +111,46 @@ class Ground(Section):
     """Speed with which a body bounces off it over that with which it fell; a fast fall returns 0.135 at least."""
 
 
+Size = Annotated[float, Field(gt=0.0, le=1e4)]
+
+
+class Obstacle(Section):
+    """Something in the way: a box along the axes, an upright cylinder, or a sphere (:mod:`colift.team.obstacles`)."""
+
+    kind: Literal["box", "cylinder", "sphere"]
+    """Which of them."""
+    centre: Point
+    """World frame, m."""
+    size: tuple[Size, Size, Size] | None = None
+    """Edges of a box, m."""
+    radius: Size | None = None
+    """Of a cylinder or sphere, m."""
+    height: Size | None = None
+    """Of a cylinder, m."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        own = {"box": {"size"}, "cylinder": {"radius", "height"}, "sphere": {"radius"}}[self.kind]
+        for name in ("size", "radius", "height"):
+            if (name in own) != (getattr(self, name) is not None):
+                needs = " and ".join(sorted(own))
+                raise ValueError(f"a {self.kind} has {needs}, and no more than that")
+        return self
+
+    def row(self) -> Array:
+        """The eight numbers (:mod:`colift.team.obstacles`)."""
+        radius = self.radius or 0.0
+        half, rounding = [0.0] * 3, 0.0
+        if self.size is not None:
+            half = [0.5 * edge for edge in self.size]
+        elif self.height is not None:
+            half = [radius, radius, 0.5 * self.height]
+        else:
+            rounding = radius
+        kind = CYLINDER if self.kind == "cylinder" else BOX
+        return np.array([kind, *self.centre, *half, rounding])
+
+
 class World(Section):
     """Surroundings."""
 
@@ -120,6 +161,18 @@ class World(Section):
         Discriminator(lambda value: "none" if isinstance(value, str) else "table"),
     ] = Ground()
     """The ground, at z = 0 unless its table says otherwise; or ``"none"``, which lets things fall for ever."""
+    obstacles: Annotated[list[Obstacle], Field(max_length=1000)] = []
+    """What nothing of the team may touch: a flight that does is lost. Nobody who controls knows of them but the plan that is flown."""
+    scene: str | None = None
+    """YAML file of a planning scene whose obstacles come before these, and are kept with the mission."""
+
+    def wrong_lengths(self, n: int) -> list[tuple[str, str, str]]:
+        """None: obstacles are no drones."""
+        return []
+
+    def rows(self) -> Array:
+        """The obstacles (m, 8)."""
+        return np.array([each.row() for each in self.obstacles]).reshape(-1, WIDTH)
 
 
 Edge = Annotated[float, Field(ge=0.0, le=100.0)]

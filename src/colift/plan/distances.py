@@ -1,7 +1,6 @@
 """Distances from points and cables to obstacles, with gradients: signed, convex for each obstacle.
 
-An obstacle is a row of eight numbers: kind, centre (3), half sizes (3), rounding. Boxes stand along the axes; a sphere is a box
-without size that is rounded by its radius; the first half size of an upright cylinder is its radius, the last half its height.
+Obstacles are rows as those of :mod:`colift.team.obstacles`, which measures flights.
 """
 
 from __future__ import annotations
@@ -9,9 +8,8 @@ from __future__ import annotations
 import math
 
 from colift.kernel.jit import aside
+from colift.team.obstacles import CYLINDER
 
-BOX, CYLINDER = 0.0, 1.0
-WIDTH = 8
 STEPS = 14
 """Of the search for a cable's nearest point, each of which leaves two thirds."""
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colift.kernel.jit import f8, i8, kernel, matrix, tensor, vector, void
-from colift.plan.distances import BOX, along, distance
+from colift.plan.distances import along, distance
 from colift.plan.flatness import direction
+from colift.team.obstacles import BOX
 
 Numbers = NDArray[np.float64]
 BESIDE = 0.09

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from colift.mission.scenes import obstacle_of
 from colift.plan.planner import Plan
 from colift.record.recording import atomic_path
 
@@ -34,7 +35,11 @@ def mission_of(plan: Plan) -> dict[str, Any]:
     return {
         "name": scene.name,
         "description": f"A plan of {plan.duration:.3f} s for {len(scene.lengths)} drones through the scene {scene.name}.",
-        "world": {"gravity": limits.gravity, "ground": "none"},
+        "world": {
+            "gravity": limits.gravity,
+            "ground": "none",
+            "obstacles": [obstacle_of(row) for row in scene.obstacles.tolist()],
+        },
         "load": {"mass": limits.load_mass},
         "drones": {
             "count": len(scene.lengths),
@@ -52,6 +57,7 @@ def mission_of(plan: Plan) -> dict[str, Any]:
         },
         "criteria": {
             "tracking_max_m": {"max": TRACKED},
+            **({"min_clearance_m": {"min": 0.0}} if len(scene.obstacles) else {}),
             "min_height_m": {"min": float(plan.load_points[:, 2].min()) - TRACKED},
         },
         "plant": {"kind": "slack-cables"},

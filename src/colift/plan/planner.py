@@ -65,7 +65,14 @@ class Limits:
     """Of a drone, m; two are kept apart by twice as much."""
     load_radius: float = 0.01
     cable_radius: float = 0.005
+    room: float = 0.0
+    """Kept from obstacles beyond these radii, and twice as much between drones, for what a flight is off its plan, m."""
     gravity: float = 9.81
+
+    @property
+    def reach(self) -> float:
+        """Radius of a drone with its room, m."""
+        return self.radius + self.room
 
     def numbers(self) -> Numbers:
         """For the kernels."""
@@ -73,7 +80,8 @@ class Limits:
         return LIMITS.pack(
             0, g=self.gravity, q=self.load_mass / self.drone_mass, kappa=np.sqrt(2.0) * self.inertia / (self.arm * weight),
             most=self.most, least=self.least, rate=self.rate, cable_rate=self.rate, slack=self.slack, speed=self.speed,
-            apart=2.0 * self.radius, radius=self.radius, load_radius=self.load_radius, cable_radius=self.cable_radius, smooth=0.1,
+            apart=2.0 * self.reach, radius=self.reach, load_radius=self.load_radius + self.room,
+            cable_radius=self.cable_radius + self.room, smooth=0.1,
         )  # fmt: skip
 
 
@@ -285,8 +293,8 @@ def rest(scene: Scene, limits: Limits) -> tuple[Numbers, float]:
         three,
         scene.lengths,
         np.zeros((0, 8)),
-        limits.radius,
-        2.0 * limits.radius + 0.01,
+        limits.reach,
+        2.0 * limits.reach + 0.01,
         1.02 * limits.slack,
         0.0,
         400,
@@ -369,7 +377,7 @@ def first_guess(attempt: Attempt, grid: Grid, rng: np.random.Generator, k: int) 
         scene.start,
         scene.goal,
         scene.obstacles,
-        limits.radius,
+        limits.reach,
         room,
         rng,
         0.0 if k == 0 else 0.8,
@@ -381,7 +389,7 @@ def first_guess(attempt: Attempt, grid: Grid, rng: np.random.Generator, k: int) 
         pulls[1:-1] += (shift - shift.mean(axis=0)).ravel()
     attempt.obstacles = guess.one_sided(places, scene.obstacles)
     guess.yield_to(
-        places, pulls, scene.lengths, attempt.obstacles, limits.radius + 0.01, 2.05 * limits.radius,
+        places, pulls, scene.lengths, attempt.obstacles, limits.reach + 0.01, 2.05 * limits.reach,
         limits.slack + 0.1, 0.02, 40,
     )  # fmt: skip
     far = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.errors import MissingExtraError, Problem, SceneError
-from colift.extras import install
-from colift.plan.distances import BOX, CYLINDER, WIDTH
+from colift.errors import Problem, SceneError
+from colift.mission.scenes import numbers, obstacles_of, read_scene
 
 Numbers = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ class Scene:
     lengths : (n,) array
         Of the cables.
     obstacles : (m, 8) array
-        Rows of :mod:`colift.plan.distances`.
+        Rows of :mod:`colift.team.obstacles`.
 
     """
 
@@ -54,62 +53,14 @@ def load_scene(path: Path) -> Scene:
         Without a reader of YAML.
 
     """
-    try:
-        import yaml  # type: ignore[import-untyped]
-    except ImportError:
-        raise MissingExtraError(
-            f"{path}: reading YAML needs pyyaml; run: {install('scenes')}"
-        ) from None
-    try:
-        table = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise SceneError(str(path), [Problem("", "", f"cannot be read: {error}")]) from None
-    if not isinstance(table, Mapping):
-        raise SceneError(str(path), [Problem("", type(table).__name__, "must be a table")])
+    table = read_scene(path)
     problems: list[Problem] = []
-    environment = table.get("environment")
-    listed = environment.get("obstacles", []) if isinstance(environment, Mapping) else None
-    if not isinstance(listed, list):
-        problems.append(Problem("environment.obstacles", repr(listed), "must be a list"))
-        listed = []
-    obstacles = np.zeros((len(listed), WIDTH))
-    for k, entry in enumerate(listed):
-        _obstacle(entry, f"environment.obstacles[{k}]", obstacles[k], problems)
+    obstacles = obstacles_of(table, problems)
     found = _robot(table, problems)
     if problems or found is None:
         raise SceneError(str(path), problems)
     start, goal, directions, lengths = found
     return Scene(path.stem, start, goal, directions, lengths, obstacles)
-
-
-def _obstacle(entry: Any, path: str, row: Numbers, problems: list[Problem]) -> None:
-    """Fill the row of one obstacle."""
-    if not isinstance(entry, Mapping):
-        problems.append(Problem(path, repr(entry), "must be a table"))
-        return
-    kind = entry.get("type")
-    row[1:4] = _numbers(entry.get("center"), 3, f"{path}.center", problems, -math.inf)
-    if kind == "box":
-        row[0], row[4:7] = BOX, _numbers(entry.get("size"), 3, f"{path}.size", problems, 0.0) / 2
-    elif kind == "sphere":
-        row[7] = _numbers([entry.get("radius")], 1, f"{path}.radius", problems, 0.0)[0]
-    elif kind == "cylinder":
-        row[0] = CYLINDER
-        row[4:6] = _numbers([entry.get("radius")], 1, f"{path}.radius", problems, 0.0)[0]
-        row[6] = _numbers([entry.get("height")], 1, f"{path}.height", problems, 0.0)[0] / 2
-    else:
-        problems.append(Problem(f"{path}.type", repr(kind), "must be box, sphere or cylinder"))
-
-
-def _numbers(value: Any, count: int, path: str, problems: list[Problem], above: float) -> Numbers:
-    """So many numbers greater than ``above``; zeros, and a problem, where they are not that."""
-    fits = isinstance(value, list) and len(value) == count
-    fits = fits and all(type(v) in (int, float) and math.isfinite(v) and v > above for v in value)
-    if not fits:
-        bound = "" if math.isinf(above) else f" greater than {above:g}"
-        problems.append(Problem(path, repr(value), f"must be {count} finite numbers{bound}"))
-        return np.zeros(count)
-    return np.array(value, dtype=float)
 
 
 def _robot(
@@ -128,10 +79,10 @@ def _robot(
     if not 2 <= n <= 64:
         problems.append(Problem("robots[0].l", repr(cables), "must be 2 to 64 lengths of cables"))
         return None
-    lengths = _numbers(cables, n, "robots[0].l", problems, 0.0)
+    lengths = numbers(cables, n, "robots[0].l", problems, 0.0)
     width = 6 + 13 * n
     states = [
-        _numbers(robot.get(end), width, f"robots[0].{end}", problems, -math.inf)
+        numbers(robot.get(end), width, f"robots[0].{end}", problems, -math.inf)
         for end in ("start", "goal")
     ]
     directions = -states[0][6 : 6 + 6 * n].reshape(n, 6)[:, :3]

@@ -22,6 +22,7 @@ from colift.record.recording import Recording
 from colift.record.resting import rests
 from colift.team.contact import Boxes
 from colift.team.geometry import pairwise_angles
+from colift.team.obstacles import Bodies, corners, least_clearance
 
 _FORMULAS: dict[str, Callable[[Recording], float]] = {}
 
@@ -403,6 +404,21 @@ def setbacks(r: Recording) -> float:
         return math.nan
     before = phases[:-1][(phases[1:] == Phase.UNLOAD) & (phases[:-1] != Phase.UNLOAD)]
     return float(np.count_nonzero(before != Phase.TOUCH))
+
+
+@_metric
+def min_clearance_m(r: Recording) -> float:
+    mission = r.mission
+    if not mission.world.obstacles:
+        return math.nan
+    team = mission.true_team
+    load = r["load"][:, :1]
+    if team.body is not None and "load_attitude" in r:
+        load = corners(team.body.size, load, r["load_attitude"])
+    ends = cable_ends(r)[:, :, 0]
+    return least_clearance(
+        mission.world.rows(), Bodies(team.radii, r["positions"], ends, r["attached"], load)
+    )
 
 
 def _has_ground(r: Recording) -> bool:

@@ -37,6 +37,8 @@ export interface Hello {
   safe_distance: number | null;
   /** Height of the ground, m, where there is one. */
   ground: number | null;
+  /** What stands in the way: rows of eight numbers (colift.team.obstacles). */
+  obstacles: number[][];
   knobs: Knob[];
   choices: Choice[];
 }

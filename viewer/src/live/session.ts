@@ -172,6 +172,7 @@ function about(hello: Hello): FlightInfo {
     safe_angle_deg: hello.safe_angle_deg,
     safe_distance: hello.safe_distance,
     ground: hello.ground,
+    obstacles: hello.obstacles,
     weight: mass * GRAVITY,
     thrust: 1,
     facts: {},

@@ -15,10 +15,11 @@ import { ground } from "./ground";
 import { Overlay } from "./labels";
 import { load } from "./load";
 import { nearest } from "./nearest";
+import { obstacles } from "./obstacles";
 import { paths } from "./paths";
 import { target } from "./target";
 
-const MAKERS: Maker[] = [ground, paths, load, cables, drones, forces, angles, nearest, downwash, target];
+const MAKERS: Maker[] = [ground, obstacles, paths, load, cables, drones, forces, angles, nearest, downwash, target];
 
 export class Stage {
   readonly element = el("div", { class: "stage" });

@@ -48,6 +48,7 @@ def hello(session: Session, role: str) -> str:
             "safe_angle_deg": limits(mission).angle_deg,
             "safe_distance": limits(mission).distance_m,
             "ground": None if mission.ground is None else mission.ground.height,
+            "obstacles": mission.world.rows().tolist(),
             "legend": _legend(),
             "knobs": [
                 {**vars(knob), "value": values.get(name)} for name, knob in session.knobs.items()

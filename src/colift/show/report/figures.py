@@ -70,7 +70,7 @@ FIGURES: dict[str, Entry[Recording]] = {}
     FIGURES,
     "Path",
     "Wide: where the load should go. Thin: where it went; the squares, or boxes, are the load and "
-    "the dots the drones at the times given, with their cables. All axes have the same scale.",
+    "the dots the drones at the times given, with their cables; obstacles are outlined. All axes have the same scale.",
     needs=("load",),
 )
 def path(recording: Recording) -> Figure:

@@ -22,6 +22,7 @@ from colift.record.recording import Recording
 from colift.record.verdict import criteria_of, limits
 from colift.show.report import style
 from colift.team.geometry import pairwise_angles
+from colift.team.obstacles import CYLINDER
 
 Array = NDArray[np.float64]
 
@@ -408,6 +409,11 @@ def allocator_time(axes: Axes, recording: Recording) -> None:
     style.plain_ticks(axes.yaxis)
 
 
+CORNERS = 2.0 * (np.arange(8)[:, None] >> np.arange(3) & 1) - 1.0
+ALONG = [0, 1, 3, 2, 0, 4, 5, 7, 6, 4, -1, 1, 5, -1, 2, 6, -1, 3, 7, -1]
+"""Edges of a box with these corners: below, above, then what connects them; -1 is a gap."""
+
+
 def path(axes: Any, recording: Recording) -> None:
     """Three-dimensional path, m: reference, flown, and the formation at up to four instants."""
     flight, team = intact(recording), recording.mission.team
@@ -444,6 +450,8 @@ def path(axes: Any, recording: Recording) -> None:
         )
     points = np.concatenate([wanted, flown, drones.reshape(-1, 3)])
     _equal_box(axes, points[np.isfinite(points).all(axis=1)])
+    if outlines := _obstacles(axes, recording.mission.world.rows()):
+        axes.plot(*np.concatenate(outlines).T, color=style.MUTED, linewidth=0.9, label="obstacles")
     for name in "xyz":
         getattr(axes, f"set_{name}label")(f"{name} (m)", labelpad=0.0)
         axes.tick_params(axis=name, pad=0.0)
@@ -453,13 +461,30 @@ def _boxes(flight: Recording, rows: list[int]) -> Array:
     """Edges of a rigid load at these rows, one line (k, 3) with gaps."""
     team = flight.mission.true_team
     assert team.body is not None
-    corners = 0.5 * team.body.size * (2.0 * (np.arange(8)[:, None] >> np.arange(3) & 1) - 1.0)
+    corners = 0.5 * team.body.size * CORNERS
     load, attitude, rates = (flight[name][rows] for name in ("load", "load_attitude", "load_rates"))
     places = turned_ends(load, attitude, rates, corners)[:, :, 0]
     places = np.concatenate([places, np.full((len(rows), 1, 3), np.nan)], axis=1)
-    # Below, above, then what connects them; -1 is a gap.
-    along = [0, 1, 3, 2, 0, 4, 5, 7, 6, 4, -1, 1, 5, -1, 2, 6, -1, 3, 7, -1]
-    return places[:, along].reshape(-1, 3)
+    return places[:, ALONG].reshape(-1, 3)
+
+
+def _obstacles(axes: Any, rows: Array) -> list[Array]:
+    """Outlines (k, 3) with gaps of the obstacles that reach into the axes, cut off at their ends."""
+    low, high = np.transpose([getattr(axes, f"get_{name}lim")() for name in "xyz"])
+    a = np.linspace(0.0, 2.0 * np.pi, 33)
+    ring = np.column_stack([np.cos(a), np.sin(a), 0.0 * a])
+    gap, rod = np.full((1, 3), np.nan), np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
+    posts = [part for k in (0, 8, 16, 24) for part in (ring[k] + rod, gap)]
+    cylinder = np.concatenate([ring + rod[0], gap, ring + rod[1], gap, *posts])
+    sphere = np.concatenate([np.concatenate([np.roll(ring, k, axis=1), gap]) for k in range(3)])
+    box = np.concatenate([CORNERS, gap])[ALONG]
+    found = []
+    for kind, *centre, x, y, z, radius in rows:
+        half = np.array([x, y, z]) + radius
+        if (centre + half > low).all() and (centre - half < high).all():
+            unit = cylinder if kind == CYLINDER else sphere if radius > 0.0 else box
+            found.append(np.clip(centre + half * unit, low, high))
+    return found
 
 
 def snapshots(flown: Array, apart: float, most: int = 4) -> list[int]:

@@ -94,6 +94,7 @@ def _flight(
         "cable_lengths": mission.team.cable_lengths.tolist(),
         "radii": [_number(radius) for radius in mission.team.radii],
         "ground": None if mission.ground is None else mission.ground.height,
+        "obstacles": mission.world.rows().tolist(),
         "body": body_of(mission),
         "safe_angle_deg": limits(mission).angle_deg,
         "safe_distance": limits(mission).distance_m,
