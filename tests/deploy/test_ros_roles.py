@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ros_team import Together
 
-from colift.deploy.ros.holding import SILENT, Held
+from colift.deploy.ros.holding import EASE, REST, SILENT, Held
 from colift.deploy.ros.layers import mission_for
 from colift.deploy.ros.steering import Steering
 from colift.errors import ColiftError
@@ -18,7 +18,7 @@ from colift.record import metrics
 @pytest.mark.parametrize("takes", ["cables", "setpoints"])
 @pytest.mark.parametrize(
     ("mission", "off", "least"),
-    [("figure-eight", 0.025, 46.0), ("noisy-spiral", 0.035, 45.0), ("box-figure-eight", 0.035, 13.0)],
+    [("figure-eight", 0.005, 46.0), ("noisy-spiral", 0.03, 45.0), ("box-figure-eight", 0.012, 13.0)],
 )  # fmt: skip
 def test_a_team_flies_by_what_it_hears(mission, takes, off, least):
     team = Together(mission, {"timing.duration": 8.0}, takes)
@@ -31,19 +31,26 @@ def test_a_team_flies_by_what_it_hears(mission, takes, off, least):
 @pytest.mark.parametrize("killed", [False, True])
 @pytest.mark.parametrize("takes", ["cables", "setpoints"])
 def test_a_silent_allocator_brings_the_load_to_rest_and_it_goes_on_afterwards(takes, killed):
-    team = Together("figure-eight", {"timing.duration": 9.0}, takes)
-    recording = team.fly(silent=(3.0, 6.0), killed=killed)
+    team = Together("figure-eight", {"timing.duration": 13.0}, takes)
+    recording = team.fly(silent=(3.0, 8.0), killed=killed)
     side = team.cascade or team.world
     assert side.held.silences == 1
-    speed = np.linalg.norm(recording["load"][:, 1], axis=1)
-    rest = (recording.time > 4.5) & (recording.time < 6.0)
-    assert speed[recording.time < 3.0].max() > 0.3
-    assert speed[rest].max() < 0.02
-    assert speed[recording.time > 7.5].max() > 0.1
+    speed, time = np.linalg.norm(recording["load"][:, 1], axis=1), recording.time
+    assert speed[time < 3.0].max() > 0.3
+    assert speed[(time > 6.5) & (time < 8.0)].max() < 0.02
+    assert speed[time > 10.0].max() > 0.3
     found = metrics.compute(recording)
-    assert found["tracking_max_m"] < 0.035
+    assert found["tracking_max_m"] < 0.03
     # One that begins anew finds another of the formations that cost the same, within its limit of 30 degrees.
-    assert found["min_angle_deg"] > (37.0 if killed else 44.0)
+    assert found["min_angle_deg"] > (37.0 if killed else 40.0)
+
+
+@pytest.mark.parametrize("mission", ["box-figure-eight", "agile-box", "two-drones-bar"])
+@pytest.mark.parametrize("until", [3.3, 8.0])
+def test_a_rigid_load_whose_moment_nobody_allocates_drifts_by_centimetres(mission, until):
+    team = Together(mission, {"timing.duration": until + 3.0}, "cables")
+    found = metrics.compute(team.fly(silent=(3.0, until)))
+    assert found["tracking_max_m"] < (0.03 if until < 4.0 else 0.16)
 
 
 def test_the_clock_of_the_reference_is_held_by_silence_alone():
@@ -64,12 +71,21 @@ def test_the_clock_of_the_reference_is_held_by_silence_alone():
     assert list(held.look(late + period)) == pytest.approx([0.01, 0.06])
     assert held.silent
     assert held.silences == 1
-    assert paced(pace, 100.0)[1] == 0.0
+    assert paced(pace, 100.0)[1] == pytest.approx(1.0)
+    held.look(round(1e9 * REST) + period)
+    begin = REST + 0.01
+    assert paced(pace, begin + EASE)[1] == pytest.approx(0.0, abs=1e-12)
     assert not held.hear(0, period, force)  # older than what it has
-    held.hear(1, late + period, np.zeros(3))
-    held.look(late + 2 * period)
+    held.hear(0, 1_000_000_000, force)
+    held.hear(1, 1_000_000_000, np.zeros(3))
+    held.look(1_000_000_000)
     assert not held.silent
-    assert paced(pace, 100.0)[1] == 1.0
+    assert paced(pace, begin + EASE)[1] == pytest.approx(0.0, abs=1e-12)  # it comes to rest first
+    end = round(1e9 * (begin + EASE)) + 1
+    held.hear(0, end, force)
+    held.hear(1, end, np.zeros(3))
+    held.look(end)
+    assert paced(pace, 100.0)[1] == pytest.approx(1.0)
     assert held.tensions.tolist() == [3.0, 0.0]
     assert held.directions[1].tolist() == [0.0, 0.0, -1.0]  # without a force it stays
 

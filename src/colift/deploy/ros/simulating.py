@@ -18,18 +18,17 @@ Takes = Literal["cables", "setpoints"]
 
 OUTSIDE = {
     "cables": ("allocation",),
-    "setpoints": ("allocation", "load_control", "reference", "position_control"),
+    "setpoints": ("allocation", "load_control", "position_control"),
 }
 """Layers that are driven by what comes over topics."""
-REFERENCE = ("reference", "reference_attitude", "reference_rates")
-"""Signals that a reference writes, but for the cables' planned forces."""
 
 
 class Simulating:
     """A mission in the air, of which some layers are driven from outside.
 
     The first physics step is flown by the mission's own controllers; what they want there holds until the first word from
-    outside. Then one period of the topics after the other: what the estimation says is one physics step old.
+    outside. Then one period of the topics after the other: what the estimation says is one physics step old. The mission's reference
+    is there beside the cascade's, so that the flight is judged by it, and rests as that one does while the allocator is silent.
     """
 
     def __init__(self, mission: Mission, takes: Takes) -> None:
@@ -39,12 +38,8 @@ class Simulating:
         self.at = 0
         self._step = mission.timing.step
         self.flight.advance(self._step)
-        reference = self.flight.wires.reference.writes
-        course = {name: getattr(reference, name).copy() for name in REFERENCE}
         for layer in OUTSIDE[takes]:
             self.flight.change(layer, {"kind": "external"})
-        if "reference" in OUTSIDE[takes]:
-            self.flight.act("reference", **course)
         if mission.kinds["detection"] != "none":  # the team of nodes does not change
             self.flight.change("detection", {"kind": "none"})
         bus = self.flight.bus
@@ -79,17 +74,8 @@ class Simulating:
         bus = self.flight.bus
         return np.asarray(-bus.tensions[:, None] * bus.directions)
 
-    def led(self, reference: Body, acceleration: tuple[Array, Array]) -> None:
-        """The cascade's reference, so that it is recorded."""
-        course, rates = np.zeros((4, 3)), np.zeros((3, 3))
-        course[:2], course[2] = (reference.position, reference.velocity), acceleration[0]
-        rates[0], rates[1] = reference.rates, acceleration[1]
-        self.flight.act(
-            "reference", reference=course, reference_attitude=reference.attitude, reference_rates=rates
-        )  # fmt: skip
-
     def asked(self, force: Array, moment: Array) -> None:
-        """The cascade's wanted force and moment, likewise."""
+        """The cascade's wanted force and moment, so that they are recorded."""
         self.flight.act("load_control", force=force, moment=moment)
 
     def told(self, wanted: Sequence[Setpoint]) -> None:

@@ -16,8 +16,6 @@ from colift.deploy.ros.simulating import Simulating, Takes
 from colift.mission.mission import Mission
 from colift.record.exchange import messages
 from colift.record.exchange.messages import (
-    acceleration_of,
-    body_of,
     filled,
     setpoint_of,
     wrench_of,
@@ -45,9 +43,7 @@ class SimulatorNode(TeamNode):
         self.says = (*STATE, "reference", "acceleration", "wrench") if alone else STATE
         self.hears = {"cable_command": wrench_of}
         if not alone:
-            self.hears |= {
-                "setpoint": setpoint_of, "reference": body_of, "acceleration": acceleration_of, "wrench": wrench_of,
-            }  # fmt: skip
+            self.hears |= {"setpoint": setpoint_of, "wrench": wrench_of}
         self.sections = (
             "attitude_control",
             *(("load_control", "position_control", "observation") if alone else ()),
@@ -55,7 +51,6 @@ class SimulatorNode(TeamNode):
         super().__init__("simulator", mission, lock_step=speed is None)
         if self.lock_step and alone:
             self.be_patient(1.0)
-        self._said: dict[str, Any] = {}
 
     def prepare(self) -> None:
         self.does = Simulating(self.mission, self.takes)
@@ -78,12 +73,8 @@ class SimulatorNode(TeamNode):
                 self._answered[drone], self._waits = at, True
         elif key == "setpoint":
             self._setpoints[drone], self._answered[drone], self._waits = found, at, True
-        elif key == "wrench":
-            does.asked(*found)
         else:
-            self._said[key] = found
-            if len(self._said) == 2:
-                does.led(self._said["reference"], self._said["acceleration"])
+            does.asked(*found)
         if self.lock_step and self._complete():
             self._advance()
 
