@@ -19,6 +19,7 @@ from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, OF_ONE, SIGNALS, Signal
 from colift.mission import Mission, schema
 from colift.mission.criteria import METRICS
 from colift.part import FOLDERS, find, names
+from colift.record.exchange.topics import TOPICS
 from colift.team import Team
 from colift.wording import meanings
 
@@ -97,6 +98,7 @@ def cell(content: str | nodes.Node) -> nodes.entry:
 WIDTHS = {
     "symbol": 10, "name": 24, "shape": 11, "unit": 11, "frame": 11, "meaning": 40, "default": 14,
     "field": 16, "layer": 14, "agent": 10, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
+    "topic": 20, "message": 22, "from": 10, "holds": 34, "quality": 20, "period": 10,
 }  # fmt: skip
 
 
@@ -381,6 +383,22 @@ class PartTables(SphinxDirective):
         return paragraph
 
 
+class TopicTable(SphinxDirective):
+    """The topics of the ROS nodes."""
+
+    def run(self) -> list[nodes.Node]:
+        rows = [
+            [
+                code(each.name), code(each.type.replace("/msg/", "/")), each.writer, each.holds, each.unit, each.frame,
+                str(each.quality), each.every.replace("_", " "),
+            ]
+            for each in TOPICS.values()
+        ]  # fmt: skip
+        return [
+            table(["topic", "message", "from", "holds", "unit", "frame", "quality", "period"], rows)
+        ]
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("port-table", PortTable)
@@ -391,6 +409,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("metric-table", MetricTable)
     app.add_directive("field-table", FieldTable)
     app.add_directive("part-tables", PartTables)
+    app.add_directive("topic-table", TopicTable)
     # The pages follow the package, not only their own text: read them anew each time.
     app.connect("env-get-outdated", lambda _app, env, *_: sorted(env.found_docs))
     return {"version": "1", "parallel_read_safe": True}

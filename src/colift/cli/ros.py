@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
     from colift.deploy.ros.nodes.node import TeamNode
     from colift.mission.mission import Mission
 
-Node = Literal["launch", "allocator", "cascade", "simulator"]
+Node = Literal["launch", "allocator", "cascade", "simulator", "recorder"]
 Takes = Literal["cables", "setpoints"]
+BAG = ".mcap"
 
 Period = Annotated[
     float | None,
@@ -47,7 +49,10 @@ Speed = Annotated[
     ),
 ]  # fmt: skip
 Record = Annotated[
-    Path | None, typer.Option(help="Write the simulator's recording here when it ends.")
+    Path | None,
+    typer.Option(
+        help="Where the simulator writes its recording, FLIGHT.h5; the recorder its bag, a folder or FLIGHT.mcap; launch starts one for a bag."
+    ),
 ]
 Inactive = Annotated[bool, typer.Option("--inactive", help="Wait to be configured and activated.")]
 Rest = Annotated[
@@ -93,9 +98,11 @@ def ros(
         _launch(given, takes, record, arguments or ())
         return
     show_notes(notes)
-    ended = run(
-        lambda: _made(node, loaded, takes, speed), arguments=arguments or (), activate=not inactive
-    )
+    told: dict[str, Any] = {"arguments": arguments or (), "activate": not inactive}
+    if node == "recorder":
+        _keep(loaded, record or Path(f"{loaded.name}{BAG}"), lock_step=speed is None, **told)
+        return
+    ended = run(lambda: _made(node, loaded, takes, speed), **told)
     if node == "simulator":
         _tell(ended, record)
 
@@ -125,12 +132,24 @@ def _launch(given: list[str], takes: Takes, record: Path | None, rest: Sequence[
 
     tail = ["--", *rest] if rest else []
     saved = [] if record is None else ["--record", str(record)]
-    nodes = {
-        name: [*given, *(saved if name == "simulator" else []), *tail] for name in FIRST[takes]
-    }
+    saves = "simulator" if record is None or record.suffix == ".h5" else "recorder"
+    names = (*(["recorder"] if saves == "recorder" else []), *FIRST[takes])
+    nodes = {name: [*given, *(saved if name == saves else []), *tail] for name in names}
     code = Launch(nodes, lambda text: err.print(text, markup=False)).run()
     if code:
         raise typer.Exit(EXIT_ERROR)
+
+
+def _keep(mission: Mission, path: Path, *, lock_step: bool, **told: Any) -> None:
+    """Run the recorder, whose bag is whole once it ends."""
+    from colift.deploy.ros.nodes.node import run
+    from colift.deploy.ros.nodes.recorder import RecorderNode
+    from colift.record.exchange.bag import writing
+
+    with writing(path) as bag:
+        say = partial(print, f"records into {path}", flush=True)
+        ended = run(lambda: RecorderNode(mission, bag, lock_step=lock_step), ready=say, **told)
+    out.print(f"{path}: {ended.kept} messages", highlight=False, markup=False, soft_wrap=True)
 
 
 def _made(node: Node, mission: Mission, takes: Takes, speed: float | None) -> TeamNode:

@@ -13,6 +13,7 @@ from colift.interrupts import heard
 
 FIRST = {"cables": ("allocator", "simulator"), "setpoints": ("allocator", "cascade", "simulator")}
 """The nodes, by what the drones take; with the last one the flight ends."""
+RECORDER = "recorder"
 PATIENCE = 20.0
 """Time that a node has to end by itself, s: the simulator saves its recording."""
 LOOK, AGAIN = 0.1, 1.0
@@ -25,7 +26,10 @@ Say = Callable[[str], None]
 
 
 class Launch:
-    """Processes by node; ``arguments`` are the command's for each."""
+    """Processes by node; ``arguments`` are the command's for each.
+
+    Where there is a recorder the others start once it has said that it hears, so that the bag has the whole flight.
+    """
 
     def __init__(self, arguments: Mapping[str, Sequence[str]], say: Say) -> None:
         self._arguments, self._say = dict(arguments), say
@@ -49,15 +53,20 @@ class Launch:
                 return code
             except KeyboardInterrupt:
                 return self._end(last)
-            finally:
-                for node in self._arguments:
+            finally:  # the recorder, which is the first, hears the others' end
+                for node in reversed(self._arguments):
                     self._end(node)
 
     def _start(self, node: str) -> None:
         command = [sys.executable, "-m", "colift", "ros", node, *self._arguments[node]]
         environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
-        self._processes[node] = subprocess.Popen(command, env=environment, start_new_session=True)
+        said = subprocess.PIPE if node == RECORDER else None
+        self._processes[node] = process = subprocess.Popen(
+            command, env=environment, start_new_session=True, stdout=said
+        )
         self._since[node] = time.monotonic()
+        if process.stdout is not None:
+            self._say(process.stdout.readline().decode().rstrip())
 
     def _lives(self, node: str) -> bool:
         """Start a node again that has died; whether it is worth it."""
@@ -81,7 +90,10 @@ class Launch:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
         try:
-            return process.wait(PATIENCE)
+            code = process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
-            return process.wait()
+            code = process.wait()
+        if process.stdout is not None and (rest := process.stdout.read().decode().rstrip()):
+            self._say(rest)
+        return code

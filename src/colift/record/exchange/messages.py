@@ -87,12 +87,12 @@ def odometry(at: int, child: str, body: Body) -> Fields:
     }
 
 
-def body_of(message: Any) -> Body | None:
-    """The motion in a ``nav_msgs/Odometry``."""
+def body_of(message: Any, frame: str = WORLD) -> Body | None:
+    """The motion in a ``nav_msgs/Odometry``, in the frame of that name."""
     pose, twist = message.pose.pose, message.twist.twist
     position, linear, rates = xyz(pose.position), xyz(twist.linear), xyz(twist.angular)
     attitude = _unit(pose.orientation)
-    if attitude is None or not (_stands(message) and finite(position, linear, rates)):
+    if attitude is None or not (_stands(message, frame) and finite(position, linear, rates)):
         return None
     return Body(position, rotated(attitude, linear), attitude, rates)
 
@@ -194,8 +194,8 @@ def rotated(attitude: Any, vector: Any, *, back: bool = False) -> Array:
     return np.asarray(vector + w * across + np.cross(-v if back else v, across))
 
 
-def _stands(message: Any) -> bool:
-    return bool(message.header.frame_id == WORLD)
+def _stands(message: Any, frame: str = WORLD) -> bool:
+    return bool(message.header.frame_id == frame)
 
 
 def _unit(quaternion: Any) -> Array | None:

@@ -113,7 +113,7 @@ def _provenance(
         "files": [
             {
                 "name": path.name,
-                "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+                "sha256": _digest(path),
                 "format": kind,
                 "clock_offset_s": shift.seconds,
                 "load_mismatch_rms_m": shift.residual,
@@ -123,6 +123,12 @@ def _provenance(
         "findings": [{**asdict(each), "text": str(each)} for each in findings],
         "importer": f"colift {versions()['colift']}",
     }
+
+
+def _digest(path: Path) -> str:
+    """Of a file, or of all files of a folder in the order of their names."""
+    files = sorted(each for each in path.rglob("*") if each.is_file()) if path.is_dir() else [path]
+    return hashlib.sha256(b"".join(each.read_bytes() for each in files)).hexdigest()
 
 
 def _checked(path: Path, log: Log) -> Log:

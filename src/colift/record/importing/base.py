@@ -166,8 +166,10 @@ def read(path: Path, told: Reading | None = None) -> tuple[str, Log]:
         If it cannot be opened.
 
     """
-    with path.open("rb") as file:
-        head = file.read(HEAD)
+    head = b""
+    if not path.is_dir():  # a bag is one
+        with path.open("rb") as file:
+            head = file.read(HEAD)
     known = formats()
     for name, module in known.items():
         if module.recognises(head, path):

@@ -19,6 +19,7 @@ from colift.record.exchange.topics import NAMESPACE, TOPICS, Quality, Topic
 try:
     import rclpy
     from rcl_interfaces.msg import SetParametersResult
+    from rclpy.duration import Duration
     from rclpy.executors import ExternalShutdownException
     from rclpy.experimental import EventsExecutor
     from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -35,6 +36,10 @@ except ImportError as error:
 
 AGAIN = 0.2
 """Time after which what nobody answered is said again, s."""
+SETTLE = 6.0
+"""Longest time for what was said to reach all at the end, s."""
+DEEP = 1000
+"""Messages that wait in lock step for who is slow to take them: nobody may miss any."""
 IDLE = 0.05
 """Longest time between two looks at what is due, s."""
 
@@ -110,7 +115,8 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
     def on_configure(self, state: Any) -> Any:
         """Make what the node does anew, and its topics."""
         self.prepare()
-        self.parameters.put(self.does.flight, self.sections)
+        if self.does is not None:
+            self.parameters.put(self.does.flight, self.sections)
         for key in self.says:
             topic = TOPICS[key]
             try:
@@ -120,7 +126,7 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
                 self._publishers_of[key] = []
                 continue
             self._publishers_of[key] = [
-                self.create_publisher(made, name, self._quality(topic))
+                self.create_publisher(made, name, self.quality(topic, past=self.lock_step))
                 for name in topic.below(self.n)
             ]
         for key in self.hears:
@@ -174,29 +180,38 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
     def say(self, key: str, fields: Mapping[str, Any], drone: int = 0) -> None:
         """Publish a message, where anybody hears it or may come to hear it."""
         topic = TOPICS[key]
-        if topic.quality.latched or self.is_heard(key, drone):
+        late = topic.quality.latched or self.lock_step
+        if self._publishers_of[key] and (late or self.is_heard(key, drone)):
             made = message_class(topic.type)()
             self._publishers_of[key][drone].publish(filled(made, fields))
+
+    def settle(self) -> None:
+        """In lock step, before the end: wait until all have what was said, for a while."""
+        end = time.monotonic() + SETTLE * self.lock_step
+        for publishers in self._publishers_of.values():
+            for publisher in publishers:
+                left = end - time.monotonic()
+                if left > 0.0 and rclpy.ok():
+                    publisher.wait_for_all_acked(Duration(seconds=left))
 
     def is_heard(self, key: str, drone: int = 0) -> bool:
         """Whether anybody hears a topic."""
         publishers = self._publishers_of[key]
         return bool(publishers) and publishers[drone].get_subscription_count() > 0
 
-    def _quality(self, topic: Topic) -> Any:
-        from rclpy.duration import Duration
-
+    def quality(self, topic: Topic, *, past: bool = False) -> Any:
+        """How a topic's messages travel; with what was said before, where the ``past`` is kept or asked for."""
         asked, seconds = topic.quality, self._seconds(topic)
         reliable = asked.reliable or self.lock_step
         profile = QoSProfile(
-            depth=10 if reliable else 1,
+            depth=DEEP if self.lock_step else 10 if reliable else 1,
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL
-            if asked.latched
+            if asked.latched or past
             else DurabilityPolicy.VOLATILE,
         )
         if not self.lock_step:  # there time waits for who is late
-            profile = _timed(profile, asked, seconds, Duration)
+            profile = _timed(profile, asked, seconds)
         return profile
 
     def _seconds(self, topic: Topic) -> float:
@@ -206,7 +221,7 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
         from rclpy.event_handler import SubscriptionEventCallbacks
 
         topic, decode = TOPICS[key], self.hears[key]
-        made, quality = message_class(topic.type), self._quality(topic)
+        made, quality = message_class(topic.type), self.quality(topic)
 
         def miss(event: Any) -> None:
             self.late += event.total_count_change
@@ -228,18 +243,25 @@ class TeamNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types for w
             )
 
 
-def _timed(profile: Any, asked: Quality, period: float, duration: Any) -> Any:
+def _timed(profile: Any, asked: Quality, period: float) -> Any:
     if asked.deadline:
-        profile.deadline = duration(seconds=asked.deadline * period)
+        profile.deadline = Duration(seconds=asked.deadline * period)
     if asked.lifespan:
-        profile.lifespan = duration(seconds=asked.lifespan * period)
+        profile.lifespan = Duration(seconds=asked.lifespan * period)
     return profile
 
 
 def run(
-    make: Callable[[], TeamNode], *, arguments: Sequence[str] = (), activate: bool = True
+    make: Callable[[], TeamNode],
+    *,
+    arguments: Sequence[str] = (),
+    activate: bool = True,
+    ready: Callable[[], None] = lambda: None,
 ) -> TeamNode:
-    """Make a node and run it until it is over, or somebody ends it: Ctrl-C, SIGTERM, its lifecycle."""
+    """Make a node and run it until it is over, or somebody ends it: Ctrl-C, SIGTERM, its lifecycle.
+
+    ``ready`` is called once it hears.
+    """
     rclpy.init(args=["colift", *arguments])
     node = make()
     executor = EventsExecutor()  # a message costs it half of what the default one takes
@@ -248,9 +270,11 @@ def run(
         if activate:
             node.trigger_configure()
             node.trigger_activate()
+        ready()
         while rclpy.ok() and not node.over:
             executor.spin_once(timeout_sec=IDLE)
             node.look(time.monotonic())
+        node.settle()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
