@@ -1,7 +1,7 @@
 """Tables that are written by the package itself, so that the pages cannot go stale.
 
 Directives: ``port-table``, ``signal-table``, ``recording-layout``, ``quantity-table``, ``metric-table``,
-``field-table`` (fields of one section of a mission) and ``part-tables`` (all parts of one layer).
+``field-table`` (fields of one section of a mission) ``part-tables`` (all parts of one layer) and ``learn-table`` (tasks of the environments).
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from sphinx.util.docutils import SphinxDirective
 from colift.catalogue import DEFAULT_KINDS
 from colift.kernel.ports import PORTS
 from colift.kernel.signals import CYCLE_SIGNALS, HIDDEN, OF_ONE, SIGNALS, Signal
+from colift.learn.levels import LEVELS
+from colift.learn.tasks import ENDS, TASKS, TERMS
 from colift.mission import Mission, schema
 from colift.mission.criteria import METRICS
 from colift.part import FOLDERS, find, names
@@ -99,6 +101,8 @@ WIDTHS = {
     "symbol": 10, "name": 24, "shape": 11, "unit": 11, "frame": 11, "meaning": 40, "default": 14,
     "field": 16, "layer": 14, "agent": 10, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
     "topic": 20, "message": 22, "from": 10, "holds": 34, "quality": 20, "period": 10,
+    "task": 18, "what is wanted": 36, "time (s)": 8, "reach (m)": 8, "least height": 8, "term": 12, "what it is": 60, "end": 12, "when": 60,
+    "level": 10, "numbers a drone": 12, "what they command": 60, **dict.fromkeys(TERMS, 8),
 }  # fmt: skip
 
 
@@ -399,6 +403,36 @@ class TopicTable(SphinxDirective):
         ]
 
 
+class LearnTable(SphinxDirective):
+    """What the environments are: ``tasks``, ``terms`` of the reward, ``ends`` of an episode or ``levels`` of the action."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        return [getattr(self, self.arguments[0])()]
+
+    def tasks(self) -> nodes.Node:
+        head = ["task", "what is wanted", "time (s)", "reach (m)", "least height", *TERMS]
+        rows = [
+            [
+                code(f"colift/{name}-v0"), task.meaning, f"{task.mission['timing']['duration']:g}", f"{task.reach:g}",
+                f"{task.least_height:g}", *(f"{task.weights[term]:g}" for term in TERMS),
+            ]
+            for name, task in TASKS.items()
+        ]  # fmt: skip
+        return table(head, rows)
+
+    def terms(self) -> nodes.Node:
+        return table(["term", "what it is"], [[code(name), text] for name, text in TERMS.items()])
+
+    def ends(self) -> nodes.Node:
+        return table(["end", "when"], [[code(name), text] for name, text in ENDS.values()])
+
+    def levels(self) -> nodes.Node:
+        rows = [[code(name), str(level.width), level.meaning] for name, level in LEVELS.items()]
+        return table(["level", "numbers a drone", "what they command"], rows)
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("port-table", PortTable)
@@ -410,6 +444,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("field-table", FieldTable)
     app.add_directive("part-tables", PartTables)
     app.add_directive("topic-table", TopicTable)
+    app.add_directive("learn-table", LearnTable)
     # The pages follow the package, not only their own text: read them anew each time.
     app.connect("env-get-outdated", lambda _app, env, *_: sorted(env.found_docs))
     return {"version": "1", "parallel_read_safe": True}

@@ -116,8 +116,8 @@ def evened(teams, seen, narrower):
         numbers = KNOWN[world]
         pulls, n = NUMBERS.view(numbers, "pull"), teams.setting.drones
         share = numbers[NUMBERS.at.weight] / n
-        more = share * row[:3] - narrower * pulls * [1.0, 1.0, 0.0]
-        found.append((more / (SPAN * share)).ravel())
+        more = share * row[:, :3] - narrower * pulls * [1.0, 1.0, 0.0]
+        found.append(more / (SPAN * share))
     return np.array(found)
 
 

@@ -34,7 +34,7 @@ WORLDS = 64
 def spaces(setting: Setting) -> tuple[Any, Any]:
     """What is observed and what is commanded; a row for each drone where each observes for itself."""
     n, width = setting.drones, LEVELS[setting.level].width
-    shape = (n, width) if setting.observation == "drone" else (n * width,)
+    shape = (n * width,) if setting.observation == "central" else (n, width)
     return Box(-LIMIT, LIMIT, setting.shape, np.float32), Box(-1.0, 1.0, shape, np.float32)
 
 

@@ -267,16 +267,27 @@ def look_own(i, numbers, eyes, out, at):  # type: ignore[no-untyped-def]
 
 
 @inline
+def look_part(i, numbers, eyes, out, at):  # type: ignore[no-untyped-def]
+    """What an allocator sees that decides for drone i: the wanted force and acceleration, a rigid load's moment, its pull at rest."""
+    weight, o = numbers[N.weight], N.rows + N.width * i + N.pull
+    for k in range(3):
+        at = note(eyes.force[k] / weight - (1.0 if k == 2 else 0.0), out, at)
+    for k in range(3):
+        at = note(eyes.reference[2, k] / numbers[N.g], out, at)
+    for k in range(3 if numbers[N.rigid] > 0.0 else 0):
+        at = note(eyes.moment[k] / (weight * numbers[N.length]), out, at)
+    for k in range(3):
+        at = note(eyes.attached.shape[0] * numbers[o + k] / weight, out, at)
+    return at
+
+
+@inline
 def look(kind, numbers, eyes, out):  # type: ignore[no-untyped-def]
     """Write an observation."""
     n, at = eyes.attached.shape[0], 0
     if kind == PART:
-        for k in range(3):
-            at = note(eyes.force[k] / numbers[N.weight] - (1.0 if k == 2 else 0.0), out, at)
-        for k in range(3):
-            at = note(eyes.reference[2, k] / numbers[N.g], out, at)
-        for k in range(3 if numbers[N.rigid] > 0.0 else 0):
-            at = note(eyes.moment[k] / (numbers[N.weight] * numbers[N.length]), out, at)
+        for i in range(n):
+            at = look_part(i, numbers, eyes, out, at)
     elif kind == CENTRAL:
         at = look_shared(numbers, eyes, out, at)
         for i in range(n):

@@ -30,6 +30,6 @@ OWN = 15
 def observed(kind: int, n: int, *, rigid: bool, boxes: bool) -> tuple[int, ...]:
     """Shape of an observation."""
     if kind == PART:
-        return (9 if rigid else 6,)
+        return (n, 12 if rigid else 9)
     shared = 12 + 6 * rigid + 3 * boxes
     return (shared + n * OWN,) if kind == CENTRAL else (n, shared + OWN + 3 * (n - 1))
