@@ -27,7 +27,11 @@ PICTURES = {
     ),
 }
 
-BOX = colift.run("box-figure-eight")
+FILMS = {
+    "box-figure-eight": (np.arange(9.2, 14.6, 0.1), 160),  # one eight
+    "through-a-window": (np.arange(1.0, 3.0, 0.05), 200),  # half as fast
+}
+"""Times, s, and how many colours."""
 
 
 def film(
@@ -55,9 +59,12 @@ with tempfile.TemporaryDirectory() as folder, browser() as started:
         page.locator(DRAWN).wait_for()
         page.evaluate("time => colift.seek(time)", time)
         page.screenshot(path=HERE / f"{name}.png")
-    data = payload([BOX.recording], [BOX.metrics], [""])
-    page = started.new_page(viewport={"width": 960, "height": 540})
-    page.goto(write_page(Path(folder) / "box.html", data, theme="light", bare=True).as_uri())
-    page.locator(DRAWN).wait_for()
-    once = np.arange(9.2, 14.6, 0.1)  # one eight
-    film(page, HERE / "box-figure-eight.gif", once.tolist(), (560, 315), 160)
+    for name, (times, colours) in FILMS.items():
+        run = colift.run(name)
+        data = payload([run.recording], [run.metrics], [""])
+        page = started.new_page(viewport={"width": 960, "height": 540})
+        page.goto(
+            write_page(Path(folder) / f"{name}.html", data, theme="light", bare=True).as_uri()
+        )
+        page.locator(DRAWN).wait_for()
+        film(page, HERE / f"{name}.gif", times.tolist(), (560, 315), colours)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from windows import window
 
-from colift.errors import MissionError, PlanError
+from colift.errors import MissionError, PlanError, SettingError
+from colift.mission.load import load_mission
 from colift.plan import planner
 from colift.plan.distances import along, distance
 from colift.plan.problem import assemble
@@ -194,6 +196,35 @@ def test_scenes_are_read_and_their_mistakes_named(tmp_path):
         "32 finite",
     ):
         assert part in text
+
+
+def test_ends_of_the_load_alone_ask_for_a_cone(tmp_path):
+    file = tmp_path / "scene.yaml"
+    robot = {"l": [0.5] * 4, "start": [0.0, 0.0, 1.0], "goal": [2.0, 0.0, 1.0]}
+    file.write_text(json.dumps({"environment": {}, "robots": [robot]}))
+    scene = load_scene(file)
+    assert scene.directions is None
+    assert (scene.lengths.size, *scene.goal) == (4, 2.0, 0.0, 1.0)
+    file.write_text(json.dumps({"robots": [{**robot, "goal": [2.0]}]}))
+    with pytest.raises(MissionError, match=r"robots\[0\]\.start: must be 58 finite"):
+        load_scene(file)
+
+
+def test_limits_are_set_by_name_and_refused_by_name():
+    assert planner.Limits.of({"room": 0.03, "most": 1.25}) == planner.Limits(room=0.03, most=1.25)
+    with pytest.raises(SettingError) as refused:
+        planner.Limits.of({"room": -1, "speed": "fast", "rooms": 1.0, "rate": float("nan")})
+    for text in ("room: must be a number from 0 to 10", "'fast'", "rooms: is no limit", "rate:"):
+        assert text in str(refused.value)
+
+
+def test_the_shipped_window_is_the_scene_of_the_examples():
+    docs = Path(__file__).parents[2] / "docs"
+    scene = load_scene(docs / "examples" / "through-a-window.yaml")
+    mission = load_mission("through-a-window")
+    np.testing.assert_allclose(mission.world.rows(), scene.obstacles, atol=1e-12)
+    np.testing.assert_allclose(mission.reference.load_points[0], scene.start)
+    np.testing.assert_allclose(mission.reference.load_points[-1], scene.goal)
 
 
 def test_the_command_writes_a_plan(tmp_path):

@@ -26,12 +26,14 @@ def plan(
         float, typer.Option(help="Look for shorter plans no longer than this, s.", min=0, max=3600)
     ] = 3.0,
     attempts: Annotated[int, typer.Option(help="Guesses at most.", min=1, max=10_000)] = 12,
-    room: Annotated[
-        float,
+    limits: Annotated[
+        list[str] | None,
         typer.Option(
-            help="Kept beyond all radii, for what a flight is off its plan, m.", min=0, max=10
+            "--set",
+            metavar="NAME=VALUE",
+            help="A limit, or a number of the bodies: room=0.03 keeps so much room, m, around all, most=1.25 asks motors for less.",
         ),
-    ] = 0.0,
+    ] = None,
     npz: Annotated[
         Path | None, typer.Option("--npz", help="Write the trajectory here, sampled at 1 kHz.")
     ] = None,
@@ -49,18 +51,20 @@ def plan(
     import numpy as np
 
     with loading():
+        from colift.mission.load import parse_overrides
         from colift.plan import mission as missions
         from colift.plan import planner
         from colift.plan.scene import load_scene
+    changes = parse_overrides(limits)
     found = load_scene(scene)
     if drones is not None and drones != len(found.lengths):
         found = replace(found, directions=None, lengths=np.full(drones, found.lengths[0]))
     with progress("Planning") as advance:
         best = planner.plan(
-            found, planner.Limits(room=room), seed=seed, seconds=seconds, attempts=attempts, progress=advance
+            found, planner.Limits.of(changes), seed=seed, seconds=seconds, attempts=attempts, progress=advance
         )  # fmt: skip
     result: dict[str, Any] = {
-        "scene": found.name, "drones": len(found.lengths), "seed": seed, "room": room, "duration": best.duration, "excess": best.excess,
+        "scene": found.name, "drones": len(found.lengths), "seed": seed, "limits": changes, "duration": best.duration, "excess": best.excess,
         "guess": best.guess, "start_moved_deg": best.moved_deg, "first_s": best.first, "total_s": best.total,
     }  # fmt: skip
     if npz is not None:

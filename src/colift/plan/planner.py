@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colift.errors import PlanError
+from colift.errors import PlanError, Problem, SettingError
 from colift.kernel.math import splines
 from colift.plan import guess
 from colift.plan.problem import KINDS, LIMITS, NEVER, assemble, optimise, sampled
 from colift.plan.scene import Scene
 from colift.record.recording import atomic_path
+from colift.wording import shown
 
 Numbers = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -38,6 +39,14 @@ AGAIN = ((2.0, 30), (1.0, 30), (0.3, 40))
 POLISHES = 5
 SLOWER = 1.004
 """Factor of the duration after a plan was refused."""
+
+
+RANGES = {
+    "drone_mass": (1e-3, 100.0), "load_mass": (1e-4, 1000.0), "most": (1.0, 100.0), "least": (0.0, 1.0), "rate": (0.1, 100.0),
+    "speed": (0.01, 100.0), "slack": (0.01, 1.0), "radius": (1e-3, 10.0), "load_radius": (0.0, 10.0), "cable_radius": (0.0, 1.0),
+    "room": (0.0, 10.0), "gravity": (0.1, 100.0),
+}  # fmt: skip
+"""What a user may set of :class:`Limits`, and how far."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +77,30 @@ class Limits:
     room: float = 0.0
     """Kept from obstacles beyond these radii, and twice as much between drones, for what a flight is off its plan, m."""
     gravity: float = 9.81
+
+    @classmethod
+    def of(cls, changes: Mapping[str, Any]) -> Limits:
+        """The usual ones with these changes.
+
+        Raises
+        ------
+        SettingError
+            With every name that is no limit, and every value that none can have.
+
+        """
+        problems = []
+        for name, value in changes.items():
+            low, high = RANGES.get(name, (0.0, 0.0))
+            if name not in RANGES:
+                problems.append(
+                    Problem(name, "", f"is no limit; must be one of {', '.join(RANGES)}")
+                )
+            elif type(value) not in (int, float) or not low <= value <= high:
+                message = f"must be a number from {low:g} to {high:g}"
+                problems.append(Problem(name, shown(value), message))
+        if problems:
+            raise SettingError(problems)
+        return cls(**changes)
 
     @property
     def reach(self) -> float:

@@ -65,8 +65,8 @@ def load_scene(path: Path) -> Scene:
 
 def _robot(
     table: Mapping[str, Any], problems: list[Problem]
-) -> tuple[Numbers, Numbers, Numbers, Numbers] | None:
-    """Start, goal, directions of the start and cables of the team."""
+) -> tuple[Numbers, Numbers, Numbers | None, Numbers] | None:
+    """Start, goal, directions of the start and cables of the team; no directions where both ends are places of the load alone."""
     robots = table.get("robots")
     if not isinstance(robots, list) or len(robots) != 1 or not isinstance(robots[0], Mapping):
         problems.append(
@@ -80,11 +80,12 @@ def _robot(
         problems.append(Problem("robots[0].l", repr(cables), "must be 2 to 64 lengths of cables"))
         return None
     lengths = numbers(cables, n, "robots[0].l", problems, 0.0)
-    width = 6 + 13 * n
-    states = [
-        numbers(robot.get(end), width, f"robots[0].{end}", problems, -math.inf)
-        for end in ("start", "goal")
-    ]
+    ends = [(robot.get(end), f"robots[0].{end}") for end in ("start", "goal")]
+    alone = all(isinstance(value, list) and len(value) == 3 for value, _ in ends)
+    width = 3 if alone else 6 + 13 * n
+    states = [numbers(value, width, path, problems, -math.inf) for value, path in ends]
+    if alone:
+        return states[0], states[1], None, lengths
     directions = -states[0][6 : 6 + 6 * n].reshape(n, 6)[:, :3]
     sizes = np.linalg.norm(directions, axis=1)
     if not problems and not np.allclose(sizes, 1.0, atol=1e-3):
