@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from colift.deploy.sitl import betaflight
 from colift.deploy.sitl.process import Autopilot, check, settled
+from colift.deploy.softer import notes, softer
 from colift.errors import ColiftError, SettingError
 from colift.flight.flight import Flight, Progress, random_key, start_state
 from colift.flight.leg import places_of
@@ -41,15 +42,13 @@ PAUSE = 0.01
 """Time between two exchanges before the flight, s."""
 SILENCE = 0.1
 """Time without an answer after which a drone is taken for lost, s."""
-DRIVEN = {"attitude_control": {"kind": "external"}, "actuation": {"kind": "external"}}
-"""What the autopilots are, in the mission."""
-FASTEST = 3.0
-"""Highest frequency of a filter of the cables' wanted directions that an angle loop of 12 rad/s bears, rad/s."""
-STIFFEST = {
-    "position_control": {"k_p": 10.0, "k_d": 6.0, "k_i": 2.0},
-    "load_control": {"k_p": 9.0, "k_d": 4.5, "k_i": 2.2},
+LAG = 0.06
+"""Time by which a drone's thrust vector lags behind the sticks, s, as the controllers are told."""
+DRIVEN = {
+    "attitude_control": {"kind": "external"},
+    "actuation": {"kind": "external", "lag": LAG},
 }
-"""And the largest gains over the mass of a drone and of the load, 1/s², 1/s, 1/s³."""
+"""What the autopilots are, in the mission."""
 
 
 @dataclass(frozen=True)
@@ -69,27 +68,11 @@ def for_autopilots(name: str, overrides: dict[str, Any]) -> tuple[Mission, Motor
     found = asked.actuation
     motors = found if isinstance(found, Motors) else make("actuation", {"kind": "motors"}, asked)
     assert isinstance(motors, Motors)
-    masses = {
-        "position_control": float(asked.team.masses.min()),
-        "load_control": asked.team.load_mass,
-    }
-    lowered = {"position_control.frequency": FASTEST} | {
-        f"{section}.{gain}": round(limit * masses[section], 6)
-        for section, gains in STIFFEST.items()
-        for gain, limit in gains.items()
-    }
-    changes: dict[str, Any] = dict(DRIVEN)
-    for path, most in lowered.items():
-        section, _, gain = path.partition(".")
-        before = np.asarray(getattr(getattr(asked, section), gain, 0.0), dtype=float)
-        if path not in overrides and (before > most).any():
-            changes[path] = np.minimum(before, most).tolist()
-    notes = [
-        f"{path} = {value}: an autopilot turns no faster"
-        for path, value in changes.items()
-        if path in lowered
-    ]
-    return load_mission(name, {**overrides, **changes}), motors, notes
+    lowered = softer(asked, overrides)
+    changes = {**overrides, **DRIVEN, **lowered}
+    if hasattr(asked.observation, "lag"):  # forces are told by the thrust, not by where it points
+        changes["observation.lag"] = motors.motor_lag()
+    return load_mission(name, changes), motors, notes(lowered)
 
 
 class Rotors:
