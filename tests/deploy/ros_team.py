@@ -56,6 +56,7 @@ class Together:
                     world.held.hear(drone, at, force)
             if self.cascade is not None:
                 world.told(self.cascade.fly(at))
+                world.led(reference, acceleration)
                 world.asked(bus.force, bus.moment)
             world.advance()
         return world.flight.recording()

@@ -16,6 +16,8 @@ from colift.deploy.ros.simulating import Simulating, Takes
 from colift.mission.mission import Mission
 from colift.record.exchange import messages
 from colift.record.exchange.messages import (
+    acceleration_of,
+    body_of,
     filled,
     setpoint_of,
     wrench_of,
@@ -43,7 +45,9 @@ class SimulatorNode(TeamNode):
         self.says = (*STATE, "reference", "acceleration", "wrench") if alone else STATE
         self.hears = {"cable_command": wrench_of}
         if not alone:
-            self.hears |= {"setpoint": setpoint_of, "wrench": wrench_of}
+            self.hears |= {
+                "setpoint": setpoint_of, "reference": body_of, "acceleration": acceleration_of, "wrench": wrench_of,
+            }  # fmt: skip
         self.sections = (
             "attitude_control",
             *(("load_control", "position_control", "observation") if alone else ()),
@@ -57,6 +61,7 @@ class SimulatorNode(TeamNode):
         self._setpoints: list[Any] = [None] * self.n
         self._answered = [-1] * self.n
         self._begun, self._waits = False, True
+        self._said: dict[str, tuple[int, Any]] = {}
         self._since = self._again = 0.0
         self._paced_from = self._began = math.inf
 
@@ -73,8 +78,12 @@ class SimulatorNode(TeamNode):
                 self._answered[drone], self._waits = at, True
         elif key == "setpoint":
             self._setpoints[drone], self._answered[drone], self._waits = found, at, True
-        else:
+        elif key == "wrench":
             does.asked(*found)
+        else:
+            self._said[key] = at, found
+            if len({time for time, _ in self._said.values()}) == 1 and len(self._said) == 2:
+                does.led(self._said["reference"][1], self._said["acceleration"][1])
         if self.lock_step and self._complete():
             self._advance()
 
