@@ -88,6 +88,15 @@ def test_figure_eight_crosses_its_centre_and_reaches_its_extent():
     assert np.count_nonzero(np.diff(crossings.astype(int)) == 1) == 2
 
 
+def test_a_figure_eight_may_rise_and_fall():
+    eight = part.find("reference", "figure-eight")(height=0.35)
+    test_each_row_is_the_derivative_of_the_row_above(eight)
+    test_starts_at_rest_and_stays_there_before_the_start(eight)
+    rows = eight.sample(np.linspace(4.0, 12.0, 8001))[:, 0] - eight.centre
+    np.testing.assert_allclose(np.abs(rows).max(axis=0), [1.5, 0.75, 0.35], atol=1e-5)
+    np.testing.assert_allclose(rows[:, 2], 0.35 / 1.5 * rows[:, 0], atol=1e-12)
+
+
 def test_waypoints_are_visited_at_rest_and_joined_by_straight_lines():
     points = [(0.0, 0.0, 1.0), (2.0, 1.0, 1.5), (2.0, -1.0, 1.5)]
     plan = Waypoints(points=points, travel=3.0, hold=0.5)

@@ -1,4 +1,4 @@
-"""A horizontal figure eight, ramped up smoothly."""
+"""A figure eight, ramped up smoothly."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ PARAMS = Layout(
         "centre": 3,
         "along": 1,
         "across": 1,
+        "up": 1,
         "rate": 1,
         "ramp": 1,
         "roll": 1,
@@ -45,10 +46,11 @@ def _figure_eight(now, sees, params, memory, writes):  # type: ignore[no-untyped
     reference = writes.reference
     p = phase(t, params[P.ramp], params[P.rate])
     x, y = _wave(params[P.along], 1.0, p), _wave(params[P.across], 2.0, p)
+    z = _wave(params[P.up], 1.0, p)
     for k in range(4):
         reference[k, 0] = x[k]
         reference[k, 1] = y[k]
-        reference[k, 2] = 0.0
+        reference[k, 2] = z[k]
     for k in range(3):
         reference[0, k] += params[k]
     if params[P.lean] != 0.0 or params[P.lean + 1] != 0.0:
@@ -68,7 +70,7 @@ def _figure_eight(now, sees, params, memory, writes):  # type: ignore[no-untyped
 
 
 class FigureEight(ReferencePart):
-    """``x = length sin p``, ``y = width sin 2p`` about ``centre``; starts at rest at the centre."""
+    """``x = length sin p``, ``y = width sin 2p``, ``z = height sin p`` about ``centre``; starts at rest at the centre."""
 
     kernel = _figure_eight
     turns = ("roll_deg", "pitch_deg", "yaw_deg", "lean")
@@ -79,6 +81,8 @@ class FigureEight(ReferencePart):
     """Half of the extent along x, m."""
     width: Annotated[float, Field(ge=0.0, le=1e4)] = 0.75
     """Half of the extent along y, m."""
+    height: Annotated[float, Field(ge=0.0, le=1e4)] = 0.0
+    """Half of the extent upwards, m: one end of the eight is higher than the other."""
     period: Annotated[float, Field(gt=0.0)] = 8.0
     """Time of one eight after the ramp, s."""
     ramp: Annotated[float, Field(gt=0.0)] = 3.0
@@ -108,7 +112,7 @@ class FigureEight(ReferencePart):
         rate = 2.0 * np.pi / self.period
         lean = -self.lean * rate * rate / max(team.gravity, 1e-3)
         return PARAMS.pack(
-            team.n, centre=self.centre, along=self.length, across=self.width, rate=rate, ramp=self.ramp,
+            team.n, centre=self.centre, along=self.length, across=self.width, up=self.height, rate=rate, ramp=self.ramp,
             roll=math.radians(self.roll_deg), pitch=math.radians(self.pitch_deg), yaw=math.radians(self.yaw_deg),
             lean=(lean * self.length, 4.0 * lean * self.width),
         )  # fmt: skip
