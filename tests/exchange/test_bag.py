@@ -197,8 +197,10 @@ def test_a_bag_is_whole_or_not_there(flown, written, tmp_path, monkeypatch):
 
 def test_the_commands(flown, tmp_path):
     recording = flown.save(tmp_path / "flight.h5")
-    done = colift("bag", str(recording), "--json", folder=tmp_path, check=True)
-    assert '"file": "flight.mcap"' in done.stdout
+    done = colift("export", "bag", str(recording), "--json", folder=tmp_path, check=True)
+    assert '"files": ["flight.mcap"]' in " ".join(done.stdout.split()).replace("[ ", "[").replace(
+        " ]", "]"
+    )
     judged = colift(
         "judge", "flight.mcap", "--allocators", "sqp", "--out", "judged", "--no-report", folder=tmp_path, check=True
     )  # fmt: skip

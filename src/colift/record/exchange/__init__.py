@@ -1,1 +1,35 @@
-"""Formats in which flights and messages are exchanged with other programs: ROS 2 topics, and bags of them."""
+"""Formats in which flights, teams and messages are exchanged with other programs, a file each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from colift.record.recording import Recording
+
+
+def written(
+    recording: Recording, kind: str, path: Path, progress: Callable[[float], None] | None = None
+) -> list[Path]:
+    """The files that a recording was written to, as a ``"bag"`` of ROS 2, ``"csv"``, ``"parquet"`` or ``"rerun"``.
+
+    Raises
+    ------
+    ColiftError
+        For a bag that is there already.
+    MissingExtraError
+        Without the package that writes it.
+    OSError
+        If it cannot be written.
+
+    """
+    if kind == "bag":
+        from colift.record.exchange.bag import write_bag
+
+        return [write_bag(recording, path, progress)]
+    from colift.record.exchange import rerun, tables
+
+    write = {"csv": tables.write_csv, "parquet": tables.write_parquet, "rerun": rerun.write_rerun}
+    return write[kind](recording, path, progress)

@@ -149,13 +149,7 @@ def frames(at: int, load: Body, drones: Sequence[Body], ends: Array) -> list[Fie
     poses = {LOAD: (load.position, load.attitude)}
     poses |= {drone(i): (body.position, body.attitude) for i, body in enumerate(drones)}
     for i, (body, end) in enumerate(zip(drones, ends, strict=True)):
-        away = body.position - end
-        length = float(np.linalg.norm(away))
-        along = away / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
-        turned = (
-            zero_yaw_quaternion(along) if along[2] > -0.999999 else np.array([0.0, 1.0, 0.0, 0.0])
-        )
-        poses[cable(i)] = end, turned
+        poses[cable(i)] = end, pointing(body.position - end)
     return [
         {
             "header": _header(at, WORLD),
@@ -165,6 +159,13 @@ def frames(at: int, load: Body, drones: Sequence[Body], ends: Array) -> list[Fie
         for name, (place, attitude) in poses.items()
         if finite(place, attitude)
     ]
+
+
+def pointing(away: Array) -> Array:
+    """An attitude, wxyz, whose z points along a vector; level for one without length."""
+    length = float(np.linalg.norm(away))
+    along = away / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+    return zero_yaw_quaternion(along) if along[2] > -0.999999 else np.array([0.0, 1.0, 0.0, 0.0])
 
 
 def filled(message: Any, fields: Mapping[str, Any]) -> Any:

@@ -34,7 +34,7 @@ def urdf(team: Team, name: str) -> str:
     robot = Tree.Element("robot", name=name)
     for key, colour in COLOURS.items():
         material = Tree.SubElement(robot, "material", name=key)
-        Tree.SubElement(material, "color", rgba=_text([*colour, 1.0]))
+        Tree.SubElement(material, "color", rgba=numbers([*colour, 1.0]))
     Tree.SubElement(robot, "link", name=WORLD)
     _load(robot, team)
     for i in range(team.n):
@@ -50,7 +50,7 @@ def urdf(team: Team, name: str) -> str:
 def _load(robot: Tree.Element, team: Team) -> None:
     link, body = _link(robot, LOAD), team.body
     if body is None:
-        radius = (0.75 * team.load_mass / (math.pi * DENSITY)) ** (1.0 / 3.0)
+        radius = radius_of(team)
         _inertial(link, team.load_mass, 0.4 * team.load_mass * radius**2 * np.eye(3))
         _shape(link, "load", [0, 0, 0], "sphere", radius=radius)
     else:
@@ -61,13 +61,9 @@ def _load(robot: Tree.Element, team: Team) -> None:
 def _drone(robot: Tree.Element, team: Team, i: int) -> None:
     link = _link(robot, drone(i))
     _inertial(link, float(team.masses[i]), np.diag(team.inertias[i]))
-    arm = float(team.arms[i]) if math.isfinite(team.arms[i]) else ARM
-    disc = float(team.rotor_radii[i]) if math.isfinite(team.rotor_radii[i]) else DISC * arm / ARM
-    rotors = int(team.rotors[i]) if math.isfinite(team.rotors[i]) else 4
+    arm, disc, places = rotors_of(team, i)
     _shape(link, "hull", [0, 0, 0], "box", size=[arm, 0.6 * arm, HEIGHT * arm / ARM])
-    for k in range(rotors):
-        angle = 2.0 * math.pi * (k + 0.5) / rotors
-        place = [arm * math.cos(angle), arm * math.sin(angle), 0.5 * HEIGHT * arm / ARM]
+    for place in places:
         _shape(link, "rotor", place, "cylinder", radius=disc, length=THICK)
 
 
@@ -81,7 +77,7 @@ def _link(robot: Tree.Element, name: str) -> Tree.Element:
 
 def _inertial(link: Tree.Element, mass: float, inertia: np.ndarray, centre: Sequence[float] | np.ndarray = (0, 0, 0)) -> None:  # fmt: skip
     inertial = Tree.SubElement(link, "inertial")
-    Tree.SubElement(inertial, "origin", xyz=_text(centre))
+    Tree.SubElement(inertial, "origin", xyz=numbers(centre))
     Tree.SubElement(inertial, "mass", value=f"{mass:.9g}")
     places = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}  # fmt: skip
     Tree.SubElement(inertial, "inertia", {k: f"{inertia[at]:.9g}" for k, at in places.items()})
@@ -91,11 +87,32 @@ def _shape(
     link: Tree.Element, material: str, place: Sequence[float], kind: str, **sizes: object
 ) -> None:
     visual = Tree.SubElement(link, "visual")
-    Tree.SubElement(visual, "origin", xyz=_text(place))
-    given = {k: f"{v:.6g}" if isinstance(v, float) else _text(v) for k, v in sizes.items()}  # type: ignore[arg-type]
+    Tree.SubElement(visual, "origin", xyz=numbers(place))
+    given = {k: f"{v:.6g}" if isinstance(v, float) else numbers(v) for k, v in sizes.items()}  # type: ignore[arg-type]
     Tree.SubElement(Tree.SubElement(visual, "geometry"), kind, given)
     Tree.SubElement(visual, "material", name=material)
 
 
-def _text(values: Sequence[float] | np.ndarray) -> str:
-    return " ".join(f"{float(value):.6g}" for value in values)
+def numbers(values: Sequence[float] | np.ndarray) -> str:
+    """Numbers with spaces between them, as models are written."""
+    return " ".join(f"{float(value):.12g}" for value in values)
+
+
+def radius_of(team: Team) -> float:
+    """Of the ball as which a load that is a point is drawn, m."""
+    return float((0.75 * team.load_mass / (math.pi * DENSITY)) ** (1.0 / 3.0))
+
+
+def arm_of(team: Team, i: int) -> float:
+    """From a drone's centre to a rotor's axis, m."""
+    return float(team.arms[i]) if math.isfinite(team.arms[i]) else ARM
+
+
+def rotors_of(team: Team, i: int) -> tuple[float, float, list[list[float]]]:
+    """Of a drone its arm, a rotor's radius and the rotors' places, m."""
+    arm = arm_of(team, i)
+    disc = float(team.rotor_radii[i]) if math.isfinite(team.rotor_radii[i]) else DISC * arm / ARM
+    count = int(team.rotors[i]) if math.isfinite(team.rotors[i]) else 4
+    angles = [2.0 * math.pi * (k + 0.5) / count for k in range(count)]
+    height = 0.5 * HEIGHT * arm / ARM
+    return arm, disc, [[arm * math.cos(a), arm * math.sin(a), height] for a in angles]

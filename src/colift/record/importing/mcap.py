@@ -1,4 +1,4 @@
-"""Bags of ROS 2 with the topics of a team (:mod:`colift.record.exchange.topics`), below any namespace: of real nodes, or written by `colift bag`.
+"""Bags of ROS 2 with the topics of a team (:mod:`colift.record.exchange.topics`), below any namespace: of real nodes, or written by `colift export bag`.
 
 Rows are the load's odometry, by the time in its header. Of every other topic a row has the newest message that is not from after it, nor
 older than one and a half of its usual periods.
