@@ -1,7 +1,8 @@
 """Tables that are written by the package itself, so that the pages cannot go stale.
 
 Directives: ``port-table``, ``signal-table``, ``recording-layout``, ``quantity-table``, ``metric-table``,
-``field-table`` (fields of one section of a mission) ``part-tables`` (all parts of one layer) and ``learn-table`` (tasks of the environments).
+``field-table`` (fields of one section of a mission) ``part-tables`` (all parts of one layer) and ``learn-table`` (tasks of the environments) and
+``assumption-table`` (what certificates watch).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from colift.learn.tasks import ENDS, TASKS, TERMS
 from colift.mission import Mission, schema
 from colift.mission.criteria import METRICS
 from colift.part import FOLDERS, find, names
+from colift.record.assumptions import ASSUMPTIONS
 from colift.record.exchange.topics import TOPICS
 from colift.team import Team
 from colift.wording import meanings
@@ -99,8 +101,8 @@ def cell(content: str | nodes.Node) -> nodes.entry:
 
 WIDTHS = {
     "symbol": 10, "name": 24, "shape": 11, "unit": 11, "frame": 11, "meaning": 40, "default": 14,
-    "field": 16, "layer": 14, "agent": 10, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
     "topic": 20, "message": 22, "from": 10, "holds": 34, "quality": 20, "period": 10,
+    "quantity": 20, "field": 16, "layer": 14, "agent": 10, "sees": 44, "writes": 30, "type": 14, "range": 15, "data set": 30, "metric": 30,
     "task": 18, "what is wanted": 36, "time (s)": 8, "reach (m)": 8, "least height": 8, "term": 12, "what it is": 60, "end": 12, "when": 60,
     "level": 10, "numbers a drone": 12, "what they command": 60, **dict.fromkeys(TERMS, 8),
 }  # fmt: skip
@@ -433,6 +435,14 @@ class LearnTable(SphinxDirective):
         return table(["level", "numbers a drone", "what they command"], rows)
 
 
+class AssumptionTable(SphinxDirective):
+    """What a monitor watches."""
+
+    def run(self) -> list[nodes.Node]:
+        head = ["quantity", "unit", "meaning"]
+        return [table(head, [[code(each.name), each.unit, each.meaning] for each in ASSUMPTIONS])]
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("port-table", PortTable)
@@ -445,6 +455,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("part-tables", PartTables)
     app.add_directive("topic-table", TopicTable)
     app.add_directive("learn-table", LearnTable)
+    app.add_directive("assumption-table", AssumptionTable)
     # The pages follow the package, not only their own text: read them anew each time.
     app.connect("env-get-outdated", lambda _app, env, *_: sorted(env.found_docs))
     return {"version": "1", "parallel_read_safe": True}

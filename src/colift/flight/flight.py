@@ -81,7 +81,7 @@ class Flight:
         self.membership = Membership(mission.team)
         self._step = 0
         self._every = Periods(mission.timing.step, **mission.timing.multiples())
-        self._keys = {layer: random_key(mission.seed, layer) for layer in LAYERS}
+        self._seed = mission.seed
         self._parts: dict[str, Part] = {layer: getattr(mission, layer) for layer in LAYERS}
         winds_first = sorted(
             enumerate(mission.disturbance), key=lambda item: not item[1].makes_wind
@@ -409,6 +409,7 @@ class Flight:
         """The flight as it is now, to go on from once more: :meth:`restore`."""
         return Snapshot(
             step=self._step,
+            seed=self._seed,
             outcome=self.outcome,
             membership=replace(self.membership, found=list(self.membership.found)),
             load_mass=self._load_mass,
@@ -433,6 +434,18 @@ class Flight:
             leg.begin, leg.stretches = begin, deque(stretches)
         for vector, kept in zip(self._legs[-1].state(), before.state, strict=True):
             vector[:] = kept
+        if before.seed != self._seed:
+            self.reseed(before.seed)
+
+    def reseed(self, seed: int) -> None:
+        """From now on draw random numbers as a flight of this seed does; what was drawn before, and when faults happen, stays."""
+        self._seed, leg = seed, self._legs[-1]
+        leg.circuit = leg.circuit.keyed(*self._keys())
+
+    def _keys(self) -> tuple[dict[str, int], list[int]]:
+        """Of the random numbers of each layer, and of each disturbance."""
+        disturbing = [random_key(self._seed, f"disturbance.{k}") for k in self._disturbances]
+        return {layer: random_key(self._seed, layer) for layer in LAYERS}, disturbing
 
     def _fly_to(self, stop: int) -> None:
         """Fly to a step; on the way apply what is due, and regroup when a drone is judged lost."""
@@ -656,13 +669,15 @@ class Flight:
     def _begin_leg(self, drones: list[int], memory: dict[str, Vector]) -> None:
         """From here on these drones of the mission fly; every layer is bound to their team."""
         old, team = self._legs[-1] if self._legs else None, self._team(drones)
+        keys, disturbing = self._keys()
         disturbances = []
-        for place, (number, part) in enumerate(self._disturbances.items()):
+        for place, (key, part) in enumerate(
+            zip(disturbing, self._disturbances.values(), strict=True)
+        ):
             remembered = part.memory(team)
             if old is not None:
                 before = old.circuit.disturbances[place].memory
                 remembered = part.carry_over(before, remembered, places_of(old.drones, drones))
-            key = random_key(self.mission.seed, f"disturbance.{number}")
             packed = part.of(drones).params(self._with_real_load(team, drones))
             disturbances.append((type(part), key, packed, remembered))
         params = {layer: self._parts[layer].of(drones).params(team) for layer in LAYERS[:-1]}
@@ -671,7 +686,7 @@ class Flight:
         bus.members[:] = drones
         bus.attachments[:] = 0.0 if team.body is None else team.body.attachments
         parts = {layer: type(part) for layer, part in self._parts.items()}
-        wired = circuit(bus, parts, self._keys, params, memory, disturbances)
+        wired = circuit(bus, parts, keys, params, memory, disturbances)
         self._legs.append(Leg(drones, team, bus, wired, self._step))
 
     def _team(self, drones: list[int]) -> Team:
@@ -691,6 +706,7 @@ class Snapshot(NamedTuple):
     """What :meth:`Flight.restore` needs to go on from a moment once more."""
 
     step: int
+    seed: int
     outcome: str
     membership: Membership
     load_mass: float

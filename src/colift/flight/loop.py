@@ -12,7 +12,7 @@ The loop is compiled when every part is, and runs as plain Python otherwise: sam
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -270,6 +270,19 @@ class Circuit:
         spare = port.wire(push.Push.kernel, np.zeros(0), np.zeros(0), port.signals(1)).compiled()
         filled = (*found, *[spare] * (MAX_DISTURBANCES - used))
         return wires, leaderless, used, filled, self.common
+
+    def keyed(self, keys: Mapping[str, int], disturbing: Iterable[int]) -> Circuit:
+        """The same with other random numbers: a key for each layer, and for each disturbance."""
+        wires = {
+            name: getattr(self.wires, name)._replace(key=keys[layer])
+            for name, (layer, _) in FUNCTIONS.items()
+        }
+        others = zip(self.disturbances, disturbing, strict=True)
+        return replace(
+            self,
+            wires=Wires(**wires),
+            disturbances=tuple(wire._replace(key=key) for wire, key in others),
+        )
 
 
 def circuit(

@@ -41,6 +41,11 @@ def compute(recording: Recording) -> dict[str, float]:
     return {metric.name: _value(_FORMULAS[metric.name], recording) for metric in METRICS}
 
 
+def value_of(name: str, recording: Recording) -> float:
+    """One metric of a recording, or of a stretch of one; NaN where it does not apply."""
+    return _value(_FORMULAS[name], recording)
+
+
 def _value(formula: Callable[[Recording], float], recording: Recording) -> float:
     try:
         return float(formula(recording))

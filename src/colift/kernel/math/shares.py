@@ -75,13 +75,13 @@ def _where(level: float, a: float, b: float) -> float:
         middle = 0.5 * (low + high)
         if middle in (low, high):
             return middle
-        if _beta(a, b, middle) < level:
+        if beta(a, b, middle) < level:
             low = middle
         else:
             high = middle
 
 
-def _beta(a: float, b: float, x: float) -> float:
+def beta(a: float, b: float, x: float) -> float:
     """Regularised incomplete beta function: the probability of ``a`` hits or more in ``a + b - 1`` trials."""
     if x <= 0.0 or x >= 1.0:
         return float(x >= 1.0)

@@ -12,7 +12,7 @@ import tempfile
 import time
 import traceback
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -45,10 +45,36 @@ class Result:
     worker: str = ""
     versions: dict[str, str] = field(default_factory=dict)
     recording: bytes | None = None
+    found: dict[str, Any] = field(default_factory=dict)
+    """What a task of a study's own has found (:class:`LocalPool`)."""
+
+
+Task = Callable[[Job], Result]
+"""What a worker does with a job; a function that it can import."""
 
 
 def fly(job: Job) -> Result:
     """Fly one job in this process; whatever goes wrong becomes the result's error."""
+    return attempt(job, _fly)
+
+
+def _fly(job: Job) -> Result:
+    from colift.flight.runner import run
+
+    flown = run(job.mission)
+    return Result(
+        job.key,
+        outcome=flown.recording.outcome,
+        level=flown.verdict.level,
+        reasons=flown.verdict.reasons,
+        metrics=flown.metrics,
+        versions=flown.recording.versions,
+        recording=_file_of(flown.recording) if job.keep else None,
+    )
+
+
+def attempt(job: Job, task: Task) -> Result:
+    """Do a task with the parts of a job; whatever goes wrong becomes the result's error."""
     begin = time.perf_counter()
     worker = f"{socket.gethostname()}:{os.getpid()}"
     try:
@@ -58,18 +84,7 @@ def fly(job: Job) -> Result:
             )
         for source in job.sources:
             source.load()
-        from colift.flight.runner import run
-
-        flown = run(job.mission)
-        result = Result(
-            job.key,
-            outcome=flown.recording.outcome,
-            level=flown.verdict.level,
-            reasons=flown.verdict.reasons,
-            metrics=flown.metrics,
-            versions=flown.recording.versions,
-            recording=_file_of(flown.recording) if job.keep else None,
-        )
+        result = task(job)
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f" ({Path(last.filename).name}, line {last.lineno})"
@@ -96,8 +111,9 @@ class Pool(Protocol):
 class LocalPool:
     """Worker processes on this machine; each has one job at a time, so a death names its job."""
 
-    def __init__(self, workers: int | None = None) -> None:
+    def __init__(self, workers: int | None = None, task: Task = fly) -> None:
         self.size = workers or cores()
+        self._task = task
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> LocalPool:
@@ -144,17 +160,17 @@ class LocalPool:
         for worker in self._workers:
             if worker.pipe not in busy:
                 return worker
-        self._workers.append(_Worker())
+        self._workers.append(_Worker(self._task))
         return self._workers[-1]
 
 
 class _Worker:
     """One process and the pipe to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, task: Task) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, end = context.Pipe()
-        self._process = context.Process(target=_serve, args=(end,), daemon=True)
+        self._process = context.Process(target=_serve, args=(end, task), daemon=True)
         resource_tracker.ensure_running()  # here, for it lets SIGINT through again
         with _environment(_ONE_THREAD), _uninterrupted():
             self._process.start()
@@ -168,12 +184,12 @@ class _Worker:
         return self._process.exitcode
 
 
-def _serve(pipe: Connection) -> None:
-    """Fly what comes through the pipe until its other end is gone."""
+def _serve(pipe: Connection, task: Task) -> None:
+    """Do the task with what comes through the pipe until its other end is gone."""
     os.dup2(2, 1)  # what a part prints must not come between the lines of --json
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
-            pipe.send(fly(pipe.recv()))
+            pipe.send(task(pipe.recv()))
 
 
 @contextlib.contextmanager
