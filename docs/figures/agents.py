@@ -48,8 +48,6 @@ FIRST = 30_000
 DRONE_STEPS = 10_000_000
 PLANNED = {2: 30.0, 4: 30.0, 8: 30.0, 16: 24.0}
 """Least angle of the allocator, degrees; agents keep 5 less."""
-AT_ONCE = "agents, settling 0"
-"""Whose allocators answer with the optimum itself, not with a step towards it."""
 LOSSES = (0.0, 0.2, 0.4, 0.6)
 DELAYS = ((0.0, 0.0), (0.0, 0.02), (0.01, 0.02), (0.02, 0.03))
 
@@ -95,15 +93,12 @@ def numbers(out: Array, asked: Asked) -> dict[str, float]:
 def rehearsed(
     n: int, seed: int, size: float, rocking: bool, radio: dict[str, Any]
 ) -> dict[str, dict[str, float]]:
-    """The same wishes over the same kind of radio, without a leader, in three ways, and with one allocator for all."""
+    """The same wishes over the same kind of radio, without a leader, in two ways, and with one allocator for all."""
     asked = wanted(np.random.default_rng([seed, n]), n, size, rocking)
     team, start = team_of(n), formation_of(n, PLANNED[n] + 4.0)
-    plan, at_once = (Safe(min_angle_deg=PLANNED[n], settling=s) for s in (Safe().settling, 0.0))
+    plan = Safe(min_angle_deg=PLANNED[n])
     agent = Leaderless(min_angle_deg=PLANNED[n] - 5.0)
-    flown, settled = (
-        Rehearsal(agent, Radio(**radio), team, start, allocation=allocation, key=seed)
-        for allocation in (plan, at_once)
-    )
+    flown = Rehearsal(agent, Radio(**radio), team, start, allocation=plan, key=seed)
     link = Link(
         **{
             name: min(value, 0.999)
@@ -115,7 +110,6 @@ def rehearsed(
     return {
         "exchange": numbers(exchange.run(asked), asked),
         "agents": numbers(flown.run(asked), asked),
-        AT_ONCE: numbers(settled.run(asked), asked),
         "central": numbers(commanded(link, team, start, asked, allocation=plan, key=seed), asked),
     }
 
@@ -142,9 +136,9 @@ def curve(
     for name, (size, rocking, radio) in cases.items():
         found = {n: [rehearsed(n, seed, size, rocking, radio) for seed in seeds] for n in sizes}
         for kind in (
-            ("agents", AT_ONCE, "exchange")
+            ("agents", "exchange")
             if {*radio} & {"burst", "split"}
-            else ("agents", AT_ONCE, "central", "exchange")
+            else ("agents", "central", "exchange")
         ):
             cells = []
             for n in sizes:

@@ -44,6 +44,8 @@ a restart, which is told from outside; ``w``: scratch."""
 P, M = PARAMS.at, MEMORY.at
 AHEAD = 0.3
 """Largest distance of an offered reference from the own direction, rad."""
+TURN = 6.0
+"""Fastest turn of the planned frame, rad/s."""
 ROUNDS = 3
 """How often the wanted direction is pushed back inside of all planes."""
 HALVINGS = 5
@@ -51,6 +53,9 @@ BALANCE = 0.5
 """Time in which pulls beside the shares come to balance when nobody is asked for the formation, s."""
 CODE = 0.12
 """By how much two directions may be nearer, degrees, than the nearest codes for them."""
+FOR_GOOD = 1e3
+"""Time that is told to the allocator, s: so long that it answers with what it would settle to. A step on the way there depends on where each has heard
+the others to be, the end does not; the own way there is ``settling``."""
 ROOM = 4.0
 """By how much more than the least angle the allocator should plan, degrees."""
 WISHES, SHARES = 4.0, 1.0
@@ -317,10 +322,10 @@ def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[
 
 
 @inline
-def _ask(sees, memory, writes, me, n, since):  # type: ignore[no-untyped-def]
+def _ask(sees, memory, writes, me, n):  # type: ignore[no-untyped-def]
     """Ask for the formation of all for the mean wish, from what is known of everybody's pull."""
     m = M.mean
-    writes.asking[0] = since
+    writes.asking[0] = FOR_GOOD
     memory[M.asked] = 1.0
     x, y, z = frame.to_world(memory, M.up, memory[m], memory[m + 1], memory[m + 2])
     writes.asked_force[0], writes.asked_force[1], writes.asked_force[2] = x, y, z
@@ -364,7 +369,7 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
 
     most = params[P.rate] * dt
     plan = sees.reference
-    frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], most)
+    frame.follow_plan(memory, M.up, plan[2, 0], plan[2, 1], plan[2, 2] + params[P.g], TURN * dt)
     _take(memory, M.wish, sees.wish, numbers.MOST * params[P.wish_unit])
     _take(memory, M.steady, sees.steady_wish, numbers.MOST * params[P.wish_unit])
 
@@ -444,7 +449,7 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     writes.asking[0] = 0.0
     period = max(1, int(params[P.period] / dt + 0.5))
     if team == n and n > 1 and not (holding or others) and now.step % period == 0:
-        _ask(sees, memory, writes, me, n, period * dt)
+        _ask(sees, memory, writes, me, n)
     for row in range(n):
         inside = row == me or memory[M.peers + WIDTH * int(sees.members[row]) + Q.inside] != 0.0
         writes.inside[row] = 1.0 if inside else 0.0
@@ -510,6 +515,12 @@ class Leaderless(AgentPart):
                 "min_angle_deg",
                 f"allocation.min_angle_deg = {planned:g} plans cables where planes at {self.min_angle_deg:g} stand "
                 f"in their way: leave {ROOM:g} degrees between them",
+            )
+        rate = getattr(mission.allocation, "max_rate", None)
+        if rate is not None and rate < self.max_rate:
+            yield (
+                "max_rate",
+                f"turns cables by {self.max_rate:g} rad/s where allocation.max_rate = {rate:g}: drones that do not follow let the load swing",
             )
         least = math.degrees(pairwise_angles(mission.start_directions()).min(initial=math.pi))
         if least < self.min_angle_deg:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from colift.control.detection.base import SIGNATURE
-from colift.control.detection.residuals import MEMORY, Residuals, judge
+from colift.control.detection.residuals import MEMORY, SOON, Residuals, judge
 from colift.kernel.jit import kernel
 from colift.kernel.layout import Layout
 from colift.kernel.ports import PORTS
@@ -40,7 +40,7 @@ def _judge_itself(now, sees, params, memory, writes):  # type: ignore[no-untyped
 class SelfCheck(Residuals):
     """The signs of ``residuals``, of each drone by itself: it knows nothing of the wind of the others, nor whether all cables change.
 
-    So a sign must last longer, and a cable part faster.
+    So a sign must last longer.
     """
 
     kernel = _judge_itself
@@ -59,10 +59,7 @@ class SelfCheck(Residuals):
         return np.concatenate([super(SelfCheck, self).params(team.of([i])) for i in range(team.n)])
 
     def carry_over(self, old: Vector, fresh: Vector, places: Places) -> Vector:
-        before, alone = old.reshape(-1, fresh.size // len(places)), np.zeros(1, dtype=int)
-        rows = zip(fresh.reshape(len(places), -1), places.tolist(), strict=True)
-        kept = [
-            row if at < 0 else super(SelfCheck, self).carry_over(before[at], row, alone)
-            for row, at in rows
-        ]
-        return np.concatenate(kept)
+        kept = self.layout().carry_over(old, fresh, places)
+        for row in kept.reshape(len(places), -1):
+            MEMORY.view(row, "changed")[:], MEMORY.view(row, "tumbled")[:] = SOON, 0.0
+        return kept
