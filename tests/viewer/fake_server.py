@@ -39,7 +39,7 @@ class FakeServer:
         self.recording = recording
         self.hello = {
             "type": "hello", "protocol": 1, "name": "fake", "n": recording.n,
-            "cable_lengths": [1.0] * recording.n, "radii": [None] * recording.n, "body": None, "safe_angle_deg": 30.0, "safe_distance": None, "ground": 0.0, "legend": {},
+            "cable_lengths": [1.0] * recording.n, "radii": [None] * recording.n, "body": None, "safe_angle_deg": 30.0, "safe_distance": None, "ground": 0.0, "obstacles": [], "legend": {},
             "knobs": [
                 {"name": "allocation.mu", "label": "mu", "unit": "N^2", "min": 0.001, "max": 10.0, "value": 0.15, "log": True},
                 {"name": "load.mass", "label": "Load", "unit": "kg", "min": 0.1, "max": 0.6, "value": 0.225, "log": False},
