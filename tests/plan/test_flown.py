@@ -55,7 +55,7 @@ def test_a_team_of_others_is_led_along_the_path_without_pulls(mission):
 def test_a_file_is_read_and_kept_with_the_mission(found, mission, tmp_path):
     planner.save(found, tmp_path / "plan.npz")
     (tmp_path / "of.toml").write_text(
-        'name = "m"\n[drones]\ncount = 3\n[reference]\nkind = "plan"\nfile = "plan.npz"\n'
+        'name = "m"\n[world]\nground = "none"\n[drones]\ncount = 3\n[reference]\nkind = "plan"\nfile = "plan.npz"\n'
     )
     kept = load_mission(tmp_path / "of.toml").resolved()["reference"]
     assert "file" not in kept
@@ -95,6 +95,12 @@ def test_a_plan_for_others_is_refused_and_another_start_is_told(mission):
     assert "start.directions" in " ".join(text for _, text in found.reference.warnings(found))
     as_planned = load_mission(mission)
     assert not list(as_planned.reference.warnings(as_planned))
+
+
+def test_its_mission_lets_drones_lean_as_far_as_it_does(found, mission):
+    thrusts = found.sample(400)["thrusts"]
+    tilt = np.degrees(np.arccos(thrusts[..., 2] / np.linalg.norm(thrusts, axis=2))).max()
+    assert tilt < load_mission(mission).position_control.max_tilt_deg
 
 
 def flown(mission, changes):

@@ -18,6 +18,8 @@ PERIOD = 0.002
 """Of all controllers: so small drones turn in hundredths of a second, s."""
 TRACKED = 0.1
 """Distance from the plan within which the load is to stay, m."""
+TILT = 85.0
+"""Most tilt of a drone, degrees: plans lean further than the position controller would by itself."""
 DIGITS = 12
 """Decimals of control points."""
 HOLD, AFTER = 1.0, 2.0
@@ -62,6 +64,7 @@ def mission_of(plan: Plan) -> dict[str, Any]:
         },
         "plant": {"kind": "slack-cables"},
         "allocation": {"kind": "planned"},
+        "position_control": {"kind": "formation", "max_tilt_deg": TILT},
         "reference": {
             "kind": "plan",
             "hold": HOLD,
