@@ -65,7 +65,7 @@ def import_(
 ) -> None:
     """Turn the logs of a real flight into a recording, for `report` and `judge`.
 
-    Reads CSV (see docs/real-flights.md) and the Crazyflie's micro-SD logs, one a drone, whose clocks are
+    Reads CSV, bags, and logs of PX4, ArduPilot and the Crazyflie, one a drone (see docs/real-flights.md), whose clocks are
     aligned by the motion of the load. What was not logged stays unknown; what cannot be is left out, and said.
 
     [bold]Examples[/bold]

@@ -179,6 +179,13 @@ class Vehicle(Tracked):
         )
         send(target_system=self.system, target_component=1, **target)
 
+    def tell(self, name: str, now: float, vector: Array) -> None:
+        """Tell a vector of our world, so that the vehicle logs it."""
+        north, east, down = frames.world(vector).tolist()
+        self.line.mav.debug_vect_send(
+            name.encode(), round(1e6 * now) % (1 << 64), north, east, down
+        )
+
     def take_over(self, now: float) -> None:
         """Ask it to follow set-points and to arm, as long as it does not."""
         if now - self._asked < AGAIN:

@@ -182,11 +182,20 @@ class Station:
         if flight.outcome == "completed":
             for i, drone in enumerate(flight.drones):
                 self.vehicles[drone].say(self._told(i, drone, now))
+                self._log(i, self.vehicles[drone], now)
             if flight.time < self.mission.timing.duration:
                 return True
         for drone in flight.drones:
             self.vehicles[drone].hand_back()
         return False
+
+    def _log(self, i: int, vehicle: Vehicle, now: float) -> None:
+        """Tell a vehicle what its log should hold beside its own (:mod:`colift.record.importing.ulog`)."""
+        bus = self.flight.bus
+        vehicle.tell("load", now, self.load.position)
+        vehicle.tell("load_v", now, self.load.velocity)
+        vehicle.tell("share", now, -bus.received_tensions[i] * bus.received_directions[i])
+        vehicle.tell("force", now, bus.force)
 
     def _lose(self, now: float) -> None:
         """Go on without vehicles that are silent, or follow no more; they are told nothing any more, so that they help themselves."""

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from colift.errors import FlightDataError
+from colift.record.importing._axes import upright
 from colift.record.importing._plausible import SECONDS, doubt_time
 from colift.record.importing.base import DRONE_COLUMNS, Array, Finding, Log, Reading
 
@@ -88,7 +89,7 @@ def read(path: Path, told: Reading) -> Log:
     log = _log(column, time, n)
     if told.unit == "mm":
         log = _scaled(log, 1e-3)
-    return replace(_up(log) if told.frame == "ned" else log, findings=findings)
+    return replace(upright(log) if told.frame == "ned" else log, findings=findings)
 
 
 def _decoded(data: bytes, errors: str = "strict") -> str:
@@ -269,29 +270,3 @@ def _scaled(log: Log, factor: float) -> Log:
     """With positions and velocities in another unit; forces and attitudes as they are."""
     drones = {k: factor * v if k in _LENGTHS else v for k, v in log.drones.items()}
     return replace(log, load=factor * log.load, reference=factor * log.reference, drones=drones)
-
-
-def _up(log: Log) -> Log:
-    """From north-east-down, bodies forward-right-down, to east-north-up, bodies forward-left-up."""
-
-    def world(values: Array) -> Array:
-        return np.asarray(values[..., [1, 0, 2]] * [1.0, 1.0, -1.0])
-
-    drones = {k: v if k in ("attitudes", "rates") else world(v) for k, v in log.drones.items()}
-    drones["rates"] = log.drones["rates"] * [1.0, -1.0, -1.0]
-    drones["attitudes"] = _attitude_up(log.drones["attitudes"])
-    turned = None if log.load_attitude is None else _attitude_up(log.load_attitude)
-    return replace(
-        log,
-        load=world(log.load),
-        reference=world(log.reference),
-        drones=drones,
-        load_attitude=turned,
-    )
-
-
-def _attitude_up(attitudes: Array) -> Array:
-    """Quaternions (..., 4) of bodies."""
-    # R_up = N R F with N = [[0,1,0],[1,0,0],[0,0,-1]] (half a turn about x+y) and F = diag(1,-1,-1) (about x).
-    w, x, y, z = np.moveaxis(attitudes, -1, 0)
-    return np.asarray(math.sqrt(0.5) * np.stack([w + z, x + y, x - y, w - z], axis=-1))
