@@ -7,6 +7,7 @@ import math
 
 from pages import fill, stored, table
 
+from colift.kernel.math.sequential import student
 from colift.kernel.math.shares import interval
 from colift.study.certify import certificate, trials
 from colift.study.certify.space import Space
@@ -17,12 +18,12 @@ CERTIFIED = (
 )
 """Mission, what varies, what is assumed, bound."""
 GUSTY = {
-    "timing.duration": 2.0, "timing.allocation": 0.01, "timing.load_control": 0.01,
-    "disturbance": [{"kind": "dryden", "speed": 10.0}, {"kind": "drag", "rotor_drag": 0.02}],
+    "timing.duration": 6.0, "timing.allocation": 0.01, "timing.load_control": 0.01,
+    "disturbance": [{"kind": "wind", "speed": 10.0}, {"kind": "dryden", "speed": 10.0}, {"kind": "drag", "rotor_drag": 0.02}],
 }  # fmt: skip
-MOSTS = (0.055, 0.07)
+MOSTS = (0.08,)
 """Largest distance of the load from its reference that is allowed in the gusty hover, m."""
-WHOLE, BLOCK = 800, 0.2
+WHOLE, ESTIMATES, BLOCK = 400, 12, 0.5
 
 
 def fly():
@@ -46,7 +47,9 @@ def rare():
         if most == MOSTS[0]:
             flown = trials.fly(space, range(5_000_000, 5_000_000 + WHOLE), {})
             row["whole"] = [sum(bool(each.reason) for each in flown), WHOLE]
-        question = certificate.Question(method="splitting", most=20, particles=16, block=BLOCK)
+        question = certificate.Question(
+            method="splitting", most=ESTIMATES, particles=16, block=BLOCK
+        )
         found = certificate.certify(space, question)
         row |= {name: found[name] for name in ("probability", "interval", "blocks")}
         rows.append(row)
@@ -86,7 +89,11 @@ def main():
             flown = f"{failed} of {flights}: {number(low)} to {number(high)}"
         blocks = round(GUSTY["timing.duration"] / BLOCK)
         p, ends = row["probability"], row["interval"]
-        share = (1.0 - p) / p / ((ends[1] - p) / 1.729) ** 2 * p * p if ends else math.nan
+        share = (
+            (1.0 - p) / p / ((ends[1] - p) / student(0.95, ESTIMATES - 1)) ** 2 * p * p
+            if ends
+            else math.nan
+        )
         rows.append(
             [
                 f"{100 * row['most']:g}", number(p), "-" if ends is None else " to ".join(map(number, ends)),
