@@ -406,7 +406,7 @@ class TopicTable(SphinxDirective):
 
 
 class LearnTable(SphinxDirective):
-    """What the environments are: ``tasks``, ``terms`` of the reward, ``ends`` of an episode or ``levels`` of the action."""
+    """What the environments are: ``tasks``, ``terms`` of the reward and their ``weights``, ``ends`` of an episode or ``levels`` of the action."""
 
     required_arguments = 1
 
@@ -414,15 +414,22 @@ class LearnTable(SphinxDirective):
         return [getattr(self, self.arguments[0])()]
 
     def tasks(self) -> nodes.Node:
-        head = ["task", "what is wanted", "time (s)", "reach (m)", "least height", *TERMS]
+        head = ["task", "what is wanted", "time (s)", "reach (m)", "least height"]
         rows = [
             [
                 code(f"colift/{name}-v0"), task.meaning, f"{task.mission['timing']['duration']:g}", f"{task.reach:g}",
-                f"{task.least_height:g}", *(f"{task.weights[term]:g}" for term in TERMS),
+                f"{task.least_height:g}",
             ]
             for name, task in TASKS.items()
         ]  # fmt: skip
         return table(head, rows)
+
+    def weights(self) -> nodes.Node:
+        rows = [
+            [code(f"colift/{name}-v0"), *(f"{task.weights[term]:g}" for term in TERMS)]
+            for name, task in TASKS.items()
+        ]
+        return table(["task", *TERMS], rows)
 
     def terms(self) -> nodes.Node:
         return table(["term", "what it is"], [[code(name), text] for name, text in TERMS.items()])

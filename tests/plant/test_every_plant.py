@@ -14,7 +14,7 @@ from colift.team import Team
 from colift.team.geometry import ring, zero_yaw_quaternion
 from colift.world.plant.rigid_cables import RigidCables
 
-KINDS = part.names("plant")
+KINDS = [kind for kind in part.names("plant") if kind != "external"]  # which moves nothing
 SETTINGS = {
     "bead-cables": {"drag_coefficient": 0.0, "beads": 2}, "elastic-cables": {"stiffness": 4e4},
 }  # fmt: skip

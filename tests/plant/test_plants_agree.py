@@ -39,7 +39,7 @@ def differences(first, second):
 
 
 def test_every_plant_has_its_bounds():
-    assert {"rigid-cables", *BOUNDS} == set(names("plant"))
+    assert {"rigid-cables", "external", *BOUNDS} == set(names("plant"))
 
 
 @pytest.mark.parametrize("kind", BOUNDS)
