@@ -84,7 +84,8 @@ def test_flights_that_the_papers_allocator_does_not_survive(title: str) -> None:
     [
         name
         for name in mission_names()
-        if name != "paper-spiral" and not load_mission(name).team.body
+        # a plan keeps its own distances, which its mission's criteria ask for
+        if name not in {"paper-spiral", "through-a-window"} and not load_mission(name).team.body
     ],
 )
 def test_actual_cables_keep_the_limit_less_a_margin_in_every_shipped_mission(mission: str) -> None:
