@@ -8,6 +8,7 @@ from __future__ import annotations
 import atexit
 import importlib
 import json
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -28,6 +29,9 @@ CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os
 Step = tuple[str, ...]
 """A module to import, or layer and kind of a part to find; either compiles what is not in the cache."""
 
+MOST = 3
+"""Most processes beside one that waits to fly: its longest kernel takes a quarter of all the time, so more gain nothing."""
+
 _at_work: list[subprocess.Popen[str]] = []
 
 
@@ -35,28 +39,38 @@ _at_work: list[subprocess.Popen[str]] = []
 def on_all_cores(table: Mapping[str, Any]) -> Iterator[None]:
     """If a kernel of colift is compiled in this block, other processes compile what else the mission of this table needs.
 
-    They go on after the block, until nothing is left or this process ends.
+    They go on after the block, until nothing is left or this process ends. Workers of a campaign call nobody: they are on all cores already.
     """
-    if CORES < 2 or _at_work:
+    if (
+        CORES < 2
+        or multiprocessing.parent_process()
+        or any(each.poll() is None for each in _at_work)
+    ):
         yield
         return
 
+    called: list[subprocess.Popen[str]] = []
+
     def call(kernel: str) -> None:
-        if not _at_work:
-            _at_work.extend(processes(steps_of(table), subprocess.DEVNULL))
-            for process in _at_work:
+        if not called:
+            called.extend(processes(steps_of(table), subprocess.DEVNULL, MOST))
+            _at_work[:] = called
+            for process in called:
                 atexit.register(process.terminate)
 
     with jit.told_of_compilation(call, own=True):
         yield
 
 
-def processes(steps: Sequence[Step], out: int) -> list[subprocess.Popen[str]]:
-    """One for each further core, which take these steps, from elsewhere or from the end, and print what they compile."""
+def processes(
+    steps: Sequence[Step], out: int, most: int = CORES - 1
+) -> list[subprocess.Popen[str]]:
+    """One for each further core, and no more than ``most``, which take these steps, from elsewhere or from the end, and print what they compile."""
     paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
     started = []
-    for number in range(1, CORES):
-        begin = number // 2 * 2 * len(steps) // CORES
+    count = 1 + min(CORES - 1, most)
+    for number in range(1, count):
+        begin = number // 2 * 2 * len(steps) // count
         order = [*steps[begin:], *steps[:begin]]
         if number % 2:
             order.reverse()

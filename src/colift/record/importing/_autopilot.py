@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from colift.errors import FlightDataError
+from colift.errors import FlightDataError, MissingExtraError
+from colift.extras import install
 from colift.record.importing._axes import upright
 from colift.record.importing.base import DRONE_COLUMNS, Array, Log
 
@@ -21,6 +22,34 @@ load its place and velocity; the force of the drone's cable on it, and of all ca
 
 Series = Mapping[str, tuple[Array, Array]]
 """Times, s, and rows of each series."""
+
+
+def read_with(
+    series_of: Callable[[Path], Series],
+    path: Path,
+    system: str,
+    package: str,
+    hints: Mapping[str, str],
+) -> Log:
+    """Read one file of this system with a function that needs this package (extra ``logs``).
+
+    Raises
+    ------
+    FlightDataError
+        For one that is damaged, or without place of drone or load.
+    MissingExtraError
+        Without the package.
+
+    """
+    try:
+        series = series_of(path)
+    except ImportError:
+        raise MissingExtraError(
+            f"logs of {system} need the package {package}, the extra logs; run: {install('logs')}"
+        ) from None
+    except Exception as error:  # a damaged file makes the reader fail in any way
+        raise FlightDataError(f"{path}: cannot be read as a log of {system}: {error}") from error
+    return log_of(path, series, hints)
 
 
 def log_of(path: Path, series: Series, hints: Mapping[str, str]) -> Log:

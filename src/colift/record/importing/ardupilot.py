@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from colift.errors import FlightDataError, MissingExtraError
-from colift.extras import install
-from colift.record.importing._autopilot import log_of
+from colift.record.importing._autopilot import read_with
 from colift.record.importing.base import Array, Log, Reading
 
 MAGIC = b"\xa3\x95"
@@ -41,31 +39,18 @@ def recognises(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path, told: Reading) -> Log:
-    """Read one file.
-
-    Raises
-    ------
-    FlightDataError
-        For one that is damaged, or without place of drone or load.
-    MissingExtraError
-        Without pymavlink.
-
-    """
-    try:
-        from pymavlink.DFReader import DFReader_binary
-    except ImportError:
-        raise MissingExtraError(
-            f"logs of ArduPilot need the package pymavlink, the extra logs; run: {install('logs')}"
-        ) from None
-    try:
-        with contextlib.redirect_stderr(io.StringIO()):  # it counts what it skips
-            series = _series(DFReader_binary(str(path)))
-    except Exception as error:  # a damaged file makes the reader fail in any way
-        raise FlightDataError(f"{path}: cannot be read as a log of ArduPilot: {error}") from error
-    return log_of(path, series, HINTS)
+    """Read one file (:func:`colift.record.importing._autopilot.read_with`)."""
+    return read_with(_series, path, "ArduPilot", "pymavlink", HINTS)
 
 
-def _series(reader: Any) -> dict[str, tuple[Array, Array]]:
+def _series(path: Path) -> dict[str, tuple[Array, Array]]:
+    from pymavlink.DFReader import DFReader_binary
+
+    with contextlib.redirect_stderr(io.StringIO()):  # it counts what it skips
+        return _read(DFReader_binary(str(path)))
+
+
+def _read(reader: Any) -> dict[str, tuple[Array, Array]]:
     rows: dict[str, list[list[float]]] = defaultdict(list)
     while (message := reader.recv_match(type=list(FIELDS))) is not None:
         if getattr(message, "C", 0) or getattr(message, "I", 0):  # of another core or sensor

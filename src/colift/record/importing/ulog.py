@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from colift.errors import FlightDataError, MissingExtraError
-from colift.extras import install
-from colift.record.importing._autopilot import log_of
+from colift.record.importing._autopilot import read_with
 from colift.record.importing.base import Array, Log, Reading
 
 MAGIC = b"ULog\x01\x12\x35"
@@ -36,31 +34,14 @@ def recognises(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path, told: Reading) -> Log:
-    """Read one file.
-
-    Raises
-    ------
-    FlightDataError
-        For one that is damaged, or without place of drone or load.
-    MissingExtraError
-        Without pyulog.
-
-    """
-    try:
-        from pyulog import ULog
-    except ImportError:
-        raise MissingExtraError(
-            f"logs of PX4 need the package pyulog, the extra logs; run: {install('logs')}"
-        ) from None
-    try:
-        topics = [each for each in ULog(str(path)).data_list if each.multi_id == 0]
-        series = _series({each.name: each.data for each in topics})
-    except Exception as error:  # a damaged file makes the reader fail in any way
-        raise FlightDataError(f"{path}: cannot be read as a log of PX4: {error}") from error
-    return log_of(path, series, HINTS)
+    """Read one file (:func:`colift.record.importing._autopilot.read_with`)."""
+    return read_with(_series, path, "PX4", "pyulog", HINTS)
 
 
-def _series(topics: dict[str, Any]) -> dict[str, tuple[Array, Array]]:
+def _series(path: Path) -> dict[str, tuple[Array, Array]]:
+    from pyulog import ULog
+
+    topics = {each.name: each.data for each in ULog(str(path)).data_list if each.multi_id == 0}
     found = {}
     for name, (topic, fields) in TOPICS.items():
         if topic in topics:
