@@ -123,15 +123,18 @@ def _put(context: Any, builder: Any, signals: Signals, value: Any) -> Any:
 
 @unbox(Signals)  # type: ignore[untyped-decorator]
 def _unbox(typ: Signals, obj: Any, c: Any) -> Any:
-    # The tuple says where it stands: to take each array out of its Python object here would be most of a small kernel's code.
-    pointer = c.context.get_value_type(typ)
-    place = cgutils.alloca_once_value(c.builder, cgutils.get_null_value(pointer))
+    # The tuple says where its words stand: to take each array out of its Python object here would be most of a small kernel's code.
+    # They are copied to where no other code can write, so that what is looked up in a loop is looked up before.
+    model = c.context.get_value_type(typ.value)
+    place = cgutils.alloca_once(c.builder, model)
     number = c.pyapi.object_getattr_string(obj, "_place")
     missing = cgutils.is_null(c.builder, number)
     with c.builder.if_then(c.builder.not_(missing), likely=True):
-        c.builder.store(c.builder.inttoptr(c.pyapi.long_as_ulonglong(number), pointer), place)
+        words = c.builder.inttoptr(c.pyapi.long_as_ulonglong(number), model.as_pointer())
+        size = c.context.get_constant(types.intp, c.context.get_abi_sizeof(model))
+        cgutils.raw_memcpy(c.builder, place, words, size, 1)
         c.pyapi.decref(number)
-    return NativeValue(c.builder.load(place), is_error=missing)
+    return NativeValue(place, is_error=missing)
 
 
 @lower_cast(types.BaseNamedTuple, Signals)  # type: ignore[untyped-decorator]
