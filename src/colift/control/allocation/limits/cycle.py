@@ -80,8 +80,8 @@ SLIGHT = 1e-3
 """Largest part of the cost that is left then."""
 DRIFT = 4.0
 """Of a residual, a step with the matrix of the step before leaves the relative change of the limits times this."""
-CHEAP = 2
-"""Steps with the matrix of the step before that cost no more than one with its own."""
+CHEAP, CHEAP_OF_MANY = 2, 3
+"""Steps with the matrix of the step before that cost no more than one with its own; of teams whose matrix is no square."""
 RETRY = 0.5
 """Work of a step whose matrix had to be shifted and built again, in steps: it ends there."""
 RETRIES = 8
@@ -307,6 +307,7 @@ def near_pairs(n, limit, edge, kappa, rho, start, apart, work):  # type: ignore[
     alpha, pairs, first = work.alpha, work.pairs, work.first
     strong, kappa_pair, cos_max = work.strong, work.kappa_pair, work.cos_max
     scale = 1.0 / (limit - edge)
+    stiff = rho * newton.strength(n)
     wide = recovery.window(n, edge, alpha)
     m = 0
     begin = 0
@@ -337,7 +338,7 @@ def near_pairs(n, limit, edge, kappa, rho, start, apart, work):  # type: ignore[
                     old += start[3 * i + 2] * start[3 * j + 2]
                     cos_max[m] = max(most, max(0.5 * (old + c), c + ROOM))
                     kappa_pair[m] = min(kappa_pair[m], recovery.FIRM * (cos_max[m] - c))
-                if strong[i] == i and newton.is_strong(c, cos_max[m] - c, kappa_pair[m], rho):
+                if strong[i] == i and newton.is_strong(c, cos_max[m] - c, kappa_pair[m], stiff):
                     strong[i] = j
                 m += 1
     return m
@@ -447,7 +448,7 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
         # How much a step with the same matrix leaves: of barriers as of the change of their limits.
         left = min(DRIFT * drift, 1.0)
         # A full step leaves what it began with times that change, nearly.
-        if settled and (again or origin * drift * left**CHEAP <= tolerance):
+        if settled and (again or origin * drift * after_cheap(n, left) <= tolerance):
             known = True
             residual = newton.gradient(n, limits, caps, m, weights, work)
             if residual <= tolerance:
@@ -457,7 +458,7 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
                 break
             if again:
                 left = residual / origin
-            again = residual * left**CHEAP <= tolerance and attempts == 0 and s == 1.0
+            again = residual * after_cheap(n, left) <= tolerance and attempts == 0 and s == 1.0
         else:
             known = again = False
         if not again:
@@ -522,6 +523,14 @@ def iterate(n, limits, caps, m, task, work, info):  # type: ignore[no-untyped-de
     info[1] = residual
     info[4] = balance
     return outcome
+
+
+@inline
+def after_cheap(n, left):  # type: ignore[no-untyped-def]
+    """What all steps that cost no more than a new matrix leave of a residual, of which each leaves the part ``left``."""
+    if n <= newton.DENSE:
+        return left**CHEAP
+    return left**CHEAP_OF_MANY
 
 
 @inline

@@ -76,8 +76,9 @@ PITCH = 12
 
 DENSE = 8
 """Teams of up to so many cables have their matrix as a square; larger ones by columns, as long as the envelope is."""
-STRONG = 0.004
-"""Stiffness of a pair over that of the proximal term from which on it is strong."""
+STRONG, STRONGEST = 0.004, 0.1
+"""Stiffness of a pair over that of the proximal term from which on it is strong: up to 16 cables, and the most. It grows with the
+square of the number of cables between: a step's matrix costs that much more, one more step does not."""
 
 SYSTEM = 8 * 8 + 8 + 8
 """The system of eight, its right-hand side, and that after elimination."""
@@ -138,9 +139,15 @@ class Weights(NamedTuple):
 
 
 @inline
-def is_strong(c, g, kappa, rho):  # type: ignore[no-untyped-def]
+def strength(n):  # type: ignore[no-untyped-def]
+    """Stiffness over that of the proximal term from which on a pair of n cables is strong."""
+    return min(STRONG * max(1.0, (n / 16.0) ** 2), STRONGEST)
+
+
+@inline
+def is_strong(c, g, kappa, stiff):  # type: ignore[no-untyped-def]
     """Whether a pair with the cosine c and the margin g couples its cables noticeably beside the proximal term."""
-    return kappa * (1.0 - c * c + g) > STRONG * rho * g * g
+    return kappa * (1.0 - c * c + g) > stiff * g * g
 
 
 @inline
