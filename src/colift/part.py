@@ -267,12 +267,25 @@ class Part(BaseModel, metaclass=Refusing):
             The named tuple of the signals that the kernel writes, and what it returned.
 
         """
+        wired = self.wired(team, memory, params=params, key=key, **signals)
+        return wired(int(step), float(time), float(dt))
+
+    def wired(
+        self,
+        team: Team,
+        memory: Vector,
+        *,
+        params: Vector | None = None,
+        key: int = 0,
+        **signals: Any,
+    ) -> Callable[[int, float, float], Any]:
+        """:meth:`call` for many calls on the same arrays: of (step, time, dt), each of which finds what the one before has written."""
         from colift.kernel.ports import PORTS
 
         port, own = PORTS[self.layer], self.params(team) if params is None else params
         found = port.signals(team.n, **signals)
         wire = port.wire(type(self).kernel, own, memory, found, key=int(key))
-        return wire.writes, port.invoke(wire, int(step), float(time), float(dt))
+        return lambda step, time, dt: (wire.writes, port.invoke(wire, step, time, dt))
 
     @classmethod
     def missing(cls) -> str:

@@ -21,6 +21,13 @@ class Air:
         self.velocities, self.attitudes = np.zeros((n, 3)), np.tile(UPRIGHT, (n, 1))
         self.directions, self.direction_rates = np.tile(DOWN, (n, 1)), np.zeros((n, 3))
         self.thrusts, self.attached = np.zeros(n), np.ones(n)
+        self.ends, self.wind, self.forces = np.zeros((n, 2, 3)), np.zeros(3), np.zeros((n + 1, 3))
+        self.call = part.wired(
+            self.team, self.memory, key=key, load=self.load, ends=self.ends, positions=self.positions,
+            velocities=self.velocities, attitudes=self.attitudes, directions=self.directions,
+            direction_rates=self.direction_rates, applied_thrusts=self.thrusts, attached=self.attached,
+            wind=self.wind, external_forces=self.forces,
+        )  # fmt: skip
 
     def stretch(self):
         """Set the directions from the positions."""
@@ -28,11 +35,6 @@ class Air:
         self.directions[:] = between / np.linalg.norm(between, axis=1, keepdims=True)
 
     def act(self, step=0, wind=(0.0, 0.0, 0.0)):
-        writes, _ = self.part.call(
-            self.team, self.memory, step=step, dt=self.dt, key=self.key, load=self.load,
-            ends=np.tile(self.load, (self.n, 1, 1)),
-            positions=self.positions, velocities=self.velocities, attitudes=self.attitudes,
-            directions=self.directions, direction_rates=self.direction_rates,
-            applied_thrusts=self.thrusts, attached=self.attached, wind=np.array(wind, dtype=float),
-        )  # fmt: skip
-        return writes.wind, writes.external_forces
+        self.ends[:], self.wind[:], self.forces[:] = self.load, wind, 0.0
+        self.call(step, 0.0, self.dt)
+        return self.wind.copy(), self.forces.copy()

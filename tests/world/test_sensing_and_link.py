@@ -37,14 +37,14 @@ class Sensors:
         self.truth, self.measured = [np.zeros(s) for s in shapes], [np.zeros(s) for s in shapes]
         self.truth[3][:, 0] = 1.0
         self.stuck, self.ages = np.zeros(n + 1), np.zeros((n + 1, 3))
-
-    def read(self, step):
         truth = dict(zip(NAMES, self.truth, strict=True))
         measured = {f"measured_{n}": m for n, m in zip(NAMES, self.measured, strict=True)}
-        self.part.call(
-            self.team, self.memory, step=step, dt=self.dt, key=self.key, stuck=self.stuck, **truth,
-            **measured, measured_ages=self.ages,
+        self.call = part.wired(
+            self.team, self.memory, key=key, stuck=self.stuck, **truth, **measured, measured_ages=self.ages
         )  # fmt: skip
+
+    def read(self, step):
+        self.call(step, 0.0, self.dt)
         return dict(zip(NAMES, (m.copy() for m in self.measured), strict=True))
 
     def count(self, steps):
@@ -280,18 +280,19 @@ class Link:
         self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
         self.tensions, self.directions = np.zeros(n), np.zeros((n, 3))
         self.ages = np.zeros(n)
+        self.wanted = np.zeros(n), np.zeros((n, 3))
+        self.call = part.wired(
+            self.team, self.memory, key=key, desired_tensions=self.wanted[0], desired_directions=self.wanted[1],
+            received_tensions=self.tensions, received_directions=self.directions, received_ages=self.ages,
+        )  # fmt: skip
 
     def count(self, steps):
         """What each drone knows while the allocator counts the steps; its age says when it was sent."""
         rows = []
         for k in range(steps):
-            wanted = np.full(self.n, float(k))
-            self.part.call(
-                self.team, self.memory, step=k, key=self.key, desired_tensions=wanted,
-                desired_directions=np.repeat(wanted, 3).reshape(-1, 3),
-                received_tensions=self.tensions, received_directions=self.directions,
-                received_ages=self.ages,
-            )  # fmt: skip
+            for wanted in self.wanted:
+                wanted[:] = k
+            self.call(k, 0.0, 1e-3)
             np.testing.assert_allclose(k - 1e3 * self.ages, self.tensions, rtol=0, atol=1e-6)
             assert_array_equal(self.directions[:, 2], self.tensions)
             rows.append(self.tensions.copy())

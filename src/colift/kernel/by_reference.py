@@ -55,21 +55,21 @@ class Signals(types.Type):
 class _Place:
     """Of a tuple of arrays where compiled code finds them."""
 
-    _each: tuple[Any, ...]
+    _kinds: tuple[tuple[Any, int], ...]
 
     @cached_property
     def _words(self) -> Any:
         """What Numba keeps of each array: nobody who counts references, length, size of an item, place, shape and strides."""
         words: list[int] = []
-        for name, array, wanted in zip(self._fields, self, self._each, strict=True):  # type: ignore[attr-defined, call-overload]
-            dtype = as_dtype(wanted.dtype)
+        for name, array, (dtype, dimensions) in zip(self._fields, self, self._kinds, strict=True):  # type: ignore[attr-defined, call-overload]
             if not (
                 isinstance(array, np.ndarray)
-                and (array.dtype, array.ndim, array.flags.c_contiguous)
-                == (dtype, wanted.ndim, True)
+                and array.dtype == dtype
+                and array.ndim == dimensions
+                and array.flags.c_contiguous
             ):
                 raise TypeError(
-                    f"{type(self).__name__}.{name}: {wanted.ndim} dimensions of {dtype}, contiguous, are wanted"
+                    f"{type(self).__name__}.{name}: {dimensions} dimensions of {dtype}, contiguous, are wanted"
                 )
             place = array.__array_interface__["data"][0]
             words += (0, 0, array.size, array.itemsize, place, *array.shape, *array.strides)
@@ -86,7 +86,7 @@ class _Place:
 def signals_type(made: Any, each: Iterable[Any]) -> Signals:
     """The type of a class of named tuples whose fields are arrays of these types; that is what Numba takes each for from now on."""
     found = Signals(made, each)
-    made._each = found.each
+    made._kinds = tuple((as_dtype(kind.dtype), kind.ndim) for kind in found.each)
 
     def typeof(value: Any, context: Any) -> Any:
         return found

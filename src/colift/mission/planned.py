@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from colift.control.allocation.base import AllocatorPart
-from colift.control.position_control.base import Pose, PositionControlPart
+from colift.control.position_control.base import PositionControlPart
 from colift.control.reference.base import ReferencePart
 from colift.errors import Problem
 from colift.mission.schema import Frame
@@ -21,7 +21,7 @@ from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array, matrix_of
 from colift.team.holding import holding
-from colift.team.load import LEVEL, times_of
+from colift.team.load import LEVEL, Pose, times_of
 from colift.team.plan import shares
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def wanted(
 ) -> tuple[Array, list[Pose]]:
     """Times of a reference, evenly spaced, and the poses that it wants there; of a load that hangs leaning, leaning."""
     times = np.linspace(first, last, min(MOST, max(8, round((last - first) / STEP))))
-    poses = [reference.pose(team, float(time)) for time in times]
+    poses = [*reference.poses(team, times)]
     if team.body is None or np.array_equal(team.body.hang, LEVEL):
         return times, poses
     lean = matrix_of(team.body.hang)

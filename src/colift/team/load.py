@@ -104,11 +104,21 @@ class Body:
         return replace(self, centre=centre, inertia=inertia)
 
 
+Pose = tuple[Array, Array, Array]
+"""Motion (4, 3), attitude (4,), wxyz, and rates with two derivatives (3, 3) that are wanted of a load."""
+
+
 def times_of(first: ArrayLike, then: ArrayLike) -> Array:
     """Quaternion (4,), wxyz, of the attitude ``first``, turned in its own frame by ``then``."""
-    a, b = np.asarray(first, dtype=float), np.asarray(then, dtype=float)
-    vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
-    return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
+    (w, x, y, z), (a, b, c, d) = (np.asarray(each, dtype=float).tolist() for each in (first, then))
+    return np.array(
+        [
+            w * a - x * b - y * c - z * d,
+            w * b + a * x + y * d - z * c,
+            w * c + a * y + z * b - x * d,
+            w * d + a * z + x * c - y * b,
+        ]
+    )
 
 
 def from_to(first: ArrayLike, then: ArrayLike) -> Array:

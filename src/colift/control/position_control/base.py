@@ -10,15 +10,13 @@ from colift.kernel.ports import PORTS
 from colift.part import Part
 from colift.team import Team
 from colift.team.geometry import Array
+from colift.team.load import Pose
 
 SIGNATURE = PORTS["position_control"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
 
 Called at the layer's own period, ``now.dt``. Attitudes and rates are as old as their sensors make them.
 """
-
-Pose = tuple[Array, Array, Array]
-"""Motion (4, 3), attitude (4,) and rates with two derivatives (3, 3) that are wanted of a load."""
 
 
 class PositionControlPart(Part):

@@ -19,7 +19,7 @@ from colift.control.position_control._cable import (
     swing,
 )
 from colift.control.position_control._nominal import keep_courses, numbers, plan_pulls, room
-from colift.control.position_control.base import SIGNATURE, Pose, PositionControlPart
+from colift.control.position_control.base import SIGNATURE, PositionControlPart
 from colift.control.tuning import Delays, pendulum_gains, sway
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
@@ -28,6 +28,7 @@ from colift.kernel.math.smooth import decay
 from colift.part import Setup, Vector
 from colift.team import Team
 from colift.team.geometry import Array
+from colift.team.load import Pose
 
 PARAMS = Layout(
     team={

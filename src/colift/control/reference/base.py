@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import ClassVar, Self
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from colift.kernel.ports import PORTS
 from colift.part import Part, Vector
 from colift.team import Team
+from colift.team.load import Pose
 
 SIGNATURE = PORTS["reference"].signature
 """Of ``kernel(now, sees, params, memory, writes)`` with the port of this layer (:data:`colift.kernel.ports.PORTS`).
@@ -38,22 +40,23 @@ class ReferencePart(Part):
         """The same without roll and pitch of a rigid load, for one that leans of itself."""
         return self
 
-    def pose(self, team: Team, time: float = 0.0) -> tuple[Vector, Vector, Vector]:
+    def pose(self, team: Team, time: float = 0.0) -> Pose:
         """Motion (4, 3), attitude (4,), wxyz, and rates with two derivatives (3, 3) that are wanted at a time, s."""
+        return next(self.poses(team, (time,)))
+
+    def poses(self, team: Team, times: Iterable[float]) -> Iterator[Pose]:
+        """Those at each of some times, one after the other."""
         port = PORTS["reference"]
         signals = port.signals(team.n)
         wire = port.wire(type(self).kernel, self.params(team), np.zeros(0), signals)
-        port.invoke(wire, 0, time, 0.0)
-        names = ("reference", "reference_attitude", "reference_rates")
-        motion, attitude, rates = (signals[name] for name in names)
-        return motion, attitude, rates
+        motion, attitude, rates = (
+            signals[name] for name in ("reference", "reference_attitude", "reference_rates")
+        )
+        for time in times:
+            port.invoke(wire, 0, float(time), 0.0)
+            yield motion.copy(), attitude.copy(), rates.copy()
 
     def sample(self, times: Vector, team: Team | None = None) -> Vector:
         """Reference at the given times: (len(times), 4, 3)."""
-        team = team or Team.uniform(1)
-        port, params = PORTS["reference"], self.params(team)
-        signals, out = port.signals(team.n), np.zeros((len(times), 4, 3))
-        for row, t in zip(out, times, strict=True):
-            wire = port.wire(type(self).kernel, params, np.zeros(0), signals | {"reference": row})
-            port.invoke(wire, 0, float(t), 0.0)
-        return out
+        poses = self.poses(team or Team.uniform(1), times)
+        return np.array([motion for motion, _, _ in poses]).reshape(-1, 4, 3)
