@@ -203,3 +203,19 @@ def test_ticks_count_the_same_time_at_any_physics_step():
         assert found[::per_tick] == ticks[1e-3][:: max(1, round(dt / 1e-3))]
         assert found[per_tick - 1] == 0
     assert noise.tick(10**12, 0.01) == 10**13
+
+
+def test_the_circle_is_one():
+    """Of shares that lie close to the ends of quarters and eighths too."""
+    near = np.nextafter(np.arange(8) / 8.0, 1.0)
+    shares = np.concatenate(
+        [
+            np.arange(8) / 8.0,
+            near,
+            np.nextafter(near[1:], 0.0),
+            np.random.default_rng(3).random(4000),
+        ]
+    )
+    found = np.array([noise.on_circle(share) for share in shares.tolist()])
+    np.testing.assert_allclose(found[:, 0], np.cos(2.0 * np.pi * shares), rtol=0, atol=8e-16)
+    np.testing.assert_allclose(found[:, 1], np.sin(2.0 * np.pi * shares), rtol=0, atol=8e-16)

@@ -113,15 +113,24 @@ def _correct(o, gains, params, memory):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _forecast(o, slot, slots, dt, memory, k):  # type: ignore[no-untyped-def]
-    """One axis of position and velocity now: the state moved through all that the ring remembers since its time."""
-    s, places = o + B.state + k, int(memory[o + B.places])
-    p, v = memory[s], memory[s + 3]
-    for j in range(places):
-        a = memory[o + B.ring + 3 * ((slot - places + 1 + j + slots) % slots) + k] + memory[s + 6]
-        p += dt * (v + 0.5 * dt * a)
-        v += dt * a
-    return p, v
+def _forecast(o, slot, slots, dt, memory):  # type: ignore[no-untyped-def]
+    """Position and velocity now: the state moved through all that the ring remembers since its time, the axes side by side."""
+    s, places = o + B.state, int(memory[o + B.places])
+    px, py, pz = memory[s], memory[s + 1], memory[s + 2]
+    vx, vy, vz = memory[s + 3], memory[s + 4], memory[s + 5]
+    ux, uy, uz = memory[s + 6], memory[s + 7], memory[s + 8]
+    at = (slot - places + 1 + slots) % slots
+    for _ in range(places):
+        r = o + B.ring + 3 * at
+        ax, ay, az = memory[r] + ux, memory[r + 1] + uy, memory[r + 2] + uz
+        px += dt * (vx + 0.5 * dt * ax)
+        py += dt * (vy + 0.5 * dt * ay)
+        pz += dt * (vz + 0.5 * dt * az)
+        vx += dt * ax
+        vy += dt * ay
+        vz += dt * az
+        at = at + 1 if at + 1 < slots else 0
+    return px, py, pz, vx, vy, vz
 
 
 @inline
@@ -283,10 +292,10 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
             ages[i, 0] += dt
             continue
         ages[i, 0] = 0.0
+        found = _forecast(o, slot, slots, dt, memory)
         for k in range(3):
-            p, v = _forecast(o, slot, slots, dt, memory, k)
-            estimated_positions[i, k] = p
-            estimated_velocities[i, k] = v
+            estimated_positions[i, k] = found[k]
+            estimated_velocities[i, k] = found[3 + k]
     if memory[B.started] == 0.0:
         memory[B.age] = measured_ages[n, 0] - dt
         memory[B.places] = places
@@ -334,10 +343,10 @@ def _predict(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     if tracked:
         _correct(0, P.load, params, memory)
     ages[n, 0] = 0.0
+    found = _forecast(0, slot, slots, dt, memory)
     for k in range(3):
-        p, v = _forecast(0, slot, slots, dt, memory, k)
-        estimated_load[0, k] = p
-        estimated_load[1, k] = v
+        estimated_load[0, k] = found[k]
+        estimated_load[1, k] = found[3 + k]
     if params[P.rigid] == 0.0:
         return
     # A rigid load goes on turning as it did when it was seen.

@@ -20,6 +20,10 @@ TICK = 0.001
 
 _WORD = 0xFFFFFFFF
 _UNIT = 1.0 / 9007199254740992.0  # 2^-53
+_EVEN = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(1, 9))
+_ODD = tuple(
+    (-1.0) ** k / math.factorial(2 * k + 1) for k in range(1, 9)
+)  # of cosine and sine, from the second term on
 
 
 @inline
@@ -53,11 +57,32 @@ def uniforms(key, number, channel):  # type: ignore[no-untyped-def]
 
 
 @inline
+def on_circle(share):  # type: ignore[no-untyped-def]
+    """Cosine and sine of ``2 pi share`` for 0 <= share < 1, within 2e-16: Taylor's series about the nearest quarter.
+
+    The same on every machine, and faster than a library's.
+    """
+    quarter = int(4.0 * share + 0.5)
+    x = 2.0 * math.pi * (share - 0.25 * quarter)
+    y = x * x
+    even, odd = y * _EVEN[7], y * _ODD[7]
+    for k in range(6, 0, -1):
+        even, odd = y * (_EVEN[k] + even), y * (_ODD[k] + odd)
+    c, s = 1.0 + y * (_EVEN[0] + even), x + x * y * (_ODD[0] + odd)
+    if quarter & 1:
+        c, s = -s, c
+    if quarter & 2:
+        c, s = -c, -s
+    return c, s
+
+
+@inline
 def normals(key, number, channel):  # type: ignore[no-untyped-def]
     """Two independent standard normals (Box and Muller 1958), at most 8.57 in size."""
     u, v = uniforms(key, number, channel)
-    radius, angle = math.sqrt(-2.0 * math.log(1.0 - u)), 2.0 * math.pi * v
-    return radius * math.cos(angle), radius * math.sin(angle)
+    radius = math.sqrt(-2.0 * math.log(1.0 - u))
+    x, y = on_circle(v)
+    return radius * x, radius * y
 
 
 @inline
