@@ -10,7 +10,7 @@ from plant_rig import DOWN, E3, Rig, random_rig, rotation, slack_rig
 
 import colift
 from colift.team import Team
-from colift.world.plant.slack_cables import SlackCables
+from colift.world.plant.slack_cables import NEAR, SlackCables, crossing
 
 
 def stretch(rig):
@@ -208,3 +208,17 @@ def test_a_cut_cable_is_never_caught():
     assert stretch(rig)[0] > 1.0
     assert rig.slack_times[0] == 0.0
     assert np.all(rotation(rig.drones[0, 6:10]) == np.eye(3))
+
+
+# ---------------------------------------------------------------- the instant of an event
+
+
+@pytest.mark.parametrize("dip", [0.0, -0.3, -3.0, -30.0])
+def test_a_cubic_tells_when_a_length_is_passed(dip):
+    """A cable that comes in first, at ``dip`` m/s, and runs out again: only the second crossing counts."""
+    h, a = 1e-3, 1e5
+    x1, v1 = dip * h + 0.5 * a * h * h - NEAR, dip + a * h
+    assert x1 > 0.0
+    s = crossing(-NEAR, dip * h, x1, v1 * h, 0.5 * NEAR, 0.0, 1.0)
+    assert dip * s * h + 0.5 * a * (s * h) ** 2 == pytest.approx(1.5 * NEAR, abs=0.1 * NEAR)
+    assert s > -dip / a / h
