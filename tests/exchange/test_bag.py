@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from colift.errors import ColiftError, FlightDataError, MissingExtraError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
 from colift.record.exchange import bag
+from colift.record.exchange.foxglove import layout, write_layout
 from colift.record.importing import import_flight
 from colift.study.judge import judge, open_flight
 from terminal import colift
@@ -195,12 +197,55 @@ def test_a_bag_is_whole_or_not_there(flown, written, tmp_path, monkeypatch):
         bag.write_bag(flown, tmp_path / "none.mcap")
 
 
+def test_a_layout_asks_for_what_the_bag_has(flown, written, tmp_path):
+    """Each path of a panel leads to a number in a message of the bag, each topic and frame is there."""
+    path = write_layout(bag.topics_of(flown), flown.n, tmp_path / "spiral.mcap")
+    assert path.name == "spiral.foxglove.json"
+    made = json.loads(path.read_text())
+    panels = made["configById"]
+    placed, todo = set(), [made["layout"]]
+    while todo:
+        each = todo.pop()
+        if isinstance(each, str):
+            placed.add(each)
+        else:
+            assert each["direction"] in ("row", "column")
+            todo += [each["first"], each["second"]]
+    assert placed == set(panels)
+    assert [name.split("!")[0] for name in panels] == ["3D"] + ["Plot"] * 3 + ["DiagnosticSummary"]
+    with AnyReader([written]) as reader:
+        assert {each.topic for each in reader.connections} == bag.topics_of(flown)
+        first = {}
+        for connection, _, data in reader.messages():
+            if connection.topic not in first:
+                first[connection.topic] = reader.deserialize(data, connection.msgtype)
+    space = panels["3D!team"]
+    assert {space["layers"]["team"]["topic"], *space["topics"]} <= set(first)
+    frames = {each.child_frame_id for each in first["/tf"].transforms}
+    assert space["followTf"] in frames
+    assert {each.header.frame_id for each in first["/tf"].transforms} == {space["fixedFrame"]}
+    paths = [each["value"] for panel in panels.values() for each in panel.get("paths", ())]
+    assert len(paths) == 6 + 3 * flown.n
+    for value in paths:
+        topic, _, names = value.partition(".")
+        found = first[topic]
+        for name in names.split("."):
+            found = getattr(found, name)
+        assert isinstance(found, float)
+
+
+def test_a_layout_leaves_out_panels_without_topics():
+    made = layout({"/colift/load/odometry", "/tf"}, 2)
+    assert list(made["configById"]) == ["3D!team", "Plot!load"]
+    assert len(made["configById"]["Plot!load"]["paths"]) == 3
+    assert layout({"/tf"}, 2)["layout"] == "3D!team"
+
+
 def test_the_commands(flown, tmp_path):
     recording = flown.save(tmp_path / "flight.h5")
     done = colift("export", "bag", str(recording), "--json", folder=tmp_path, check=True)
-    assert '"files": ["flight.mcap"]' in " ".join(done.stdout.split()).replace("[ ", "[").replace(
-        " ]", "]"
-    )
+    assert json.loads(done.stdout)["files"] == ["flight.mcap", "flight.foxglove.json"]
+    assert json.loads((tmp_path / "flight.foxglove.json").read_text())["configById"]
     judged = colift(
         "judge", "flight.mcap", "--allocators", "sqp", "--out", "judged", "--no-report", folder=tmp_path, check=True
     )  # fmt: skip

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def written(
     recording: Recording, kind: str, path: Path, progress: Callable[[float], None] | None = None
 ) -> list[Path]:
-    """The files that a recording was written to, as a ``"bag"`` of ROS 2, ``"csv"``, ``"parquet"`` or ``"rerun"``.
+    """The files that a recording was written to, as a ``"bag"`` of ROS 2, with a layout of Foxglove's beside it, ``"csv"``, ``"parquet"`` or ``"rerun"``.
 
     Raises
     ------
@@ -26,9 +26,11 @@ def written(
 
     """
     if kind == "bag":
-        from colift.record.exchange.bag import write_bag
+        from colift.record.exchange.bag import topics_of, write_bag
+        from colift.record.exchange.foxglove import write_layout
 
-        return [write_bag(recording, path, progress)]
+        bag = write_bag(recording, path, progress)
+        return [bag, write_layout(topics_of(recording), recording.n, bag)]
     from colift.record.exchange import rerun, tables
 
     write = {"csv": tables.write_csv, "parquet": tables.write_parquet, "rerun": rerun.write_rerun}

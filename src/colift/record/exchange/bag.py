@@ -20,7 +20,7 @@ from colift.kernel.status import Status
 from colift.record.ends import cable_ends
 from colift.record.exchange import messages
 from colift.record.exchange.messages import Body, Fields, Setpoint
-from colift.record.exchange.topics import LOAD, TOPICS, drone
+from colift.record.exchange.topics import DIAGNOSTICS, LOAD, TOPICS, drone
 from colift.record.exchange.urdf import urdf
 from colift.record.recording import Recording, atomic_path
 
@@ -134,7 +134,7 @@ def write_bag(recording: Recording, path: Path, progress: Progress | None = None
         text = urdf(recording.mission.team, recording.mission.name)
         bag.say(description.names(0)[0], description.type, stamps[0], {"data": text})
         for at, fields in _diagnostics(recording):
-            bag.say("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", at, fields)
+            bag.say(DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray", at, fields)
         for row, at in enumerate(stamps):
             for name, kind, signals, make, known in said:
                 if known[row]:
@@ -142,6 +142,13 @@ def write_bag(recording: Recording, path: Path, progress: Progress | None = None
             if progress is not None and row % 100 == 0:
                 progress(row / rows)
     return path
+
+
+def topics_of(recording: Recording) -> set[str]:
+    """Names of all topics of a recording's bag."""
+    said = {name for name, _, signals, _ in _topics(recording) if any(_known(signals))}
+    told = {DIAGNOSTICS} if any(True for _ in _diagnostics(recording)) else set()
+    return said | told | {TOPICS["description"].names(0)[0]}
 
 
 def _known(signals: Sequence[np.ndarray]) -> list[bool]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 NAMESPACE = "/colift"
 WORLD = "world"
 LOAD = "load"
+DIAGNOSTICS = "/diagnostics"
 
 
 def drone(i: int) -> str:
