@@ -49,3 +49,13 @@ def stored(script: str, measure: Callable[[], Any]) -> Any:
     if "--fly" in sys.argv[1:]:
         path.write_text(json.dumps(measure(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return json.loads(path.read_text(encoding="utf-8"))
+
+
+def stored_parts(script: str, names: Iterable[str], measure: Callable[[list[str]], Any]) -> Any:
+    """The same of a table of parts by name; ``--fly NAME ...`` measures those only and keeps the others."""
+    known = list(names)
+    asked = sys.argv[sys.argv.index("--fly") + 1 :] if "--fly" in sys.argv else []
+    if wrong := [name for name in asked if name not in known]:
+        raise SystemExit(f"--fly {wrong[0]}: must be among {', '.join(known)}")
+    kept = json.loads(Path(script).with_suffix(".json").read_text("utf-8")) if asked else {}
+    return stored(script, lambda: {**kept, **measure(asked or known)})

@@ -65,7 +65,7 @@ def test_metrics_and_report_take_the_gap(tmp_path):
     # Short; nothing to detect; rods push when the drone leaves, where cables would have caught; no limit of thrust; no
     # distance asked for above each other; nothing is lifted off the ground or in the way; a point has no attitude.
     lifts = {
-        "dragged_m", "lift_peak", "placement_m", "setbacks", "touch_height_m", "touch_peak", "weighed_mass_kg",
+        "dragged_m", "lift_peak", "lifted_m", "placement_m", "setbacks", "touch_height_m", "touch_peak", "weighed_mass_kg",
     }  # fmt: skip
     assert unknown == lifts | {
         "tension_integral_10s_Ns", "detection_delay_s", "max_catch_impulse_Ns", "peak_thrust_fraction",

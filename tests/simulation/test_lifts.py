@@ -233,6 +233,8 @@ def test_a_load_that_cannot_be_lifted_is_given_up_and_the_drones_land(changes):
     assert run.metrics["drone_touch_speed_mps"] <= 0.15
     assert np.isnan(run.metrics["weighed_mass_kg"])
     assert run.metrics["setbacks"] == 1.0
+    assert run.verdict.level == "fail"
+    assert "lifted_m" in run.verdict.reasons[0]
 
 
 def test_a_flight_that_begins_in_the_air_ends_on_the_ground():

@@ -37,7 +37,7 @@ def synthetic(n=4, duration=20.0, period=0.01):
     arrays["touch_speeds"][99, -1], arrays["touch_speeds"][99, 0] = 0.7, 0.2
     # Lifted from there, and set down at half time.
     for begin, stop, phase in (
-        (100, 110, Phase.STAND), (110, 120, Phase.CLIMB), (120, 140, Phase.HOOK),
+        (101, 110, Phase.STAND), (110, 120, Phase.CLIMB), (120, 140, Phase.HOOK),
         (140, 155, Phase.TENSION), (155, 160, Phase.RISE), (1000, 1010, Phase.TOUCH),
         (1010, 1016, Phase.UNLOAD), (1016, 1020, Phase.SLACKEN),
     ):  # fmt: skip
@@ -114,6 +114,7 @@ EXPECTED = {
     "drone_touch_speed_mps": 0.2,
     "lift_peak": 11.0 / WEIGHT,
     "touch_peak": 0.4 * 11.15 / WEIGHT,
+    "lifted_m": 0.04,
     "dragged_m": 0.03,
     "touch_height_m": 3.0,
     "placement_m": 0.03,

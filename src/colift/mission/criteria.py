@@ -49,6 +49,7 @@ METRICS = (
     Metric("drone_touch_speed_mps", "m/s", "largest downward speed with which a drone came onto the ground; 0 if none did"),
     Metric("lift_peak", "1", "largest tension of a cable at take-off, from when they come taut, over the load's weight"),
     Metric("touch_peak", "1", "largest tension of a cable at touch-down over the load's weight"),
+    Metric("lifted_m", "m", "largest height of the load above where it lay, of a load that is to be lifted"),
     Metric("dragged_m", "m", "how far the load was dragged over the ground before it was lifted"),
     Metric("touch_height_m", "m", "height of the load above the ground when its touch-down was told"),
     Metric("placement_m", "m", "distance in the level between where the load was set down and where it should be"),

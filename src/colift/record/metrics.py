@@ -371,6 +371,13 @@ def _peak_over_weight(r: Recording, *phases: Phase) -> float:
 
 
 @_metric
+def lifted_m(r: Recording) -> float:
+    stood = np.flatnonzero(r["phase"][:, 0] == Phase.STAND)
+    heights = r["load"][:, 0, 2]
+    return _largest(heights[stood[0] :] - heights[stood[0]]) if stood.size else math.nan
+
+
+@_metric
 def dragged_m(r: Recording) -> float:
     phases = r["phase"][:, 0]
     lies = np.isin(phases, (Phase.STAND, Phase.CLIMB, Phase.HOOK, Phase.TENSION))

@@ -33,6 +33,9 @@ UPRIGHT = 90.0
 LEAST_LOST = 2.0
 """A load nearer to its reference than this, or than three of the longest cable, is late but not lost, m."""
 
+LIFTED = 0.05
+"""Height to which a load that is to be lifted has to come at least, m: a team that never lifts it keeps all other criteria."""
+
 PRESSED = 0.02
 """How far below the ground's surface a load may press itself, m."""
 
@@ -120,7 +123,7 @@ def criteria_of(mission: Described) -> dict[str, Bound]:
     """The bounds of a mission by metric: its own, and a default for what it does not name.
 
     By default the load stays within :data:`NEAR` of its reference, a rigid one within :data:`TURNED` of its attitude, and above
-    the ground, no drone turns over, and
+    the ground, one that is to be lifted comes off it, no drone turns over, and
     every actual angle and distance is at least what the allocator was asked for; where the allocator changes in
     flight, the least that it was asked for. A real flight, whose frame and allocator are not ours, has no defaults.
     """
@@ -134,6 +137,8 @@ def criteria_of(mission: Described) -> dict[str, Bound]:
         ),
         "max_tilt_deg": Bound(max=UPRIGHT),
     }
+    if mission.kinds.get("supervision") == "lift":
+        default["lifted_m"] = Bound(min=LIFTED)
     if mission.load.kind == "rigid":
         default["attitude_max_deg"] = Bound(max=TURNED)
     for metric, setting in _ASKED.items():
