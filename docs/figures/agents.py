@@ -16,7 +16,10 @@ import numpy as np
 from pages import fill, stored, table
 
 import colift
+from colift.control.agents.base import AgentPart
+from colift.control.agents.distributed_mpc import DistributedMpc
 from colift.control.agents.exchange_admm import ExchangeAdmm
+from colift.control.agents.leader import Leader
 from colift.control.agents.leaderless import Leaderless
 from colift.control.allocation.safe import Safe
 from colift.kernel.jit import thread_time_ns
@@ -49,6 +52,13 @@ DRONE_STEPS = 10_000_000
 PLANNED = {2: 30.0, 4: 30.0, 8: 30.0, 16: 24.0}
 """Least angle of the allocator, degrees; agents keep 5 less."""
 LOSSES = (0.0, 0.2, 0.4, 0.6)
+OTHERS: dict[str, type[AgentPart]] = {
+    "exchange": ExchangeAdmm,
+    "plans": DistributedMpc,
+    "leader": Leader,
+}
+HALF = "half"
+"""Of the drones are cut off from the others."""
 DELAYS = ((0.0, 0.0), (0.0, 0.02), (0.01, 0.02), (0.02, 0.03))
 
 
@@ -93,7 +103,9 @@ def numbers(out: Array, asked: Asked) -> dict[str, float]:
 def rehearsed(
     n: int, seed: int, size: float, rocking: bool, radio: dict[str, Any]
 ) -> dict[str, dict[str, float]]:
-    """The same wishes over the same kind of radio, without a leader, in two ways, and with one allocator for all."""
+    """The same wishes over the same kind of radio, by agents, in published ways, and with one allocator for all."""
+    if radio.get("split") == HALF:
+        radio = {**radio, "split": tuple(range(n // 2))}
     asked = wanted(np.random.default_rng([seed, n]), n, size, rocking)
     team, start = team_of(n), formation_of(n, PLANNED[n] + 4.0)
     plan = Safe(min_angle_deg=PLANNED[n])
@@ -106,9 +118,11 @@ def rehearsed(
             if name in {"loss", "delay", "jitter"}
         }
     )
-    exchange = Rehearsal(ExchangeAdmm(), Radio(**radio), team, start, key=seed)
-    return {
-        "exchange": numbers(exchange.run(asked), asked),
+    others = {
+        name: numbers(Rehearsal(part(), Radio(**radio), team, start, key=seed).run(asked), asked)
+        for name, part in OTHERS.items()
+    }
+    return others | {
         "agents": numbers(flown.run(asked), asked),
         "central": numbers(commanded(link, team, start, asked, allocation=plan, key=seed), asked),
     }
@@ -136,9 +150,7 @@ def curve(
     for name, (size, rocking, radio) in cases.items():
         found = {n: [rehearsed(n, seed, size, rocking, radio) for seed in seeds] for n in sizes}
         for kind in (
-            ("agents", "exchange")
-            if {*radio} & {"burst", "split"}
-            else ("agents", "central", "exchange")
+            ("agents", *OTHERS) if {*radio} & {"burst", "split"} else ("agents", "central", *OTHERS)
         ):
             cells = []
             for n in sizes:
@@ -259,8 +271,11 @@ def measure(seeds: range) -> dict[str, list[list[str]]]:
         f"{1e3 * d:g}-{1e3 * (d + j):g} ms, loss 20 %": circle(loss=0.2, delay=d, jitter=j)
         for d, j in DELAYS
     }
-    bursts = {f"bursts of {b:g} s, loss 20 %": circle(loss=0.2, burst=b) for b in (0.1, 0.5)}
-    apart = {"drone 0 cut off for 5 s": circle(split=(0,), split_at=10.0)}
+    bursts = {f"bursts of {b:g} s, loss 20 %": circle(loss=0.2, burst=b) for b in (0.1, 0.5, 5.0)}
+    apart = {
+        "drone 0 cut off for 5 s": circle(split=(0,), split_at=10.0),
+        "halves cut off for 5 s": circle(split=HALF, split_at=10.0),
+    }
     hard = {
         f"5 m/s², {1e3 * d:g}-{1e3 * (d + j):g} ms, loss 20 %": (
             5.0,
@@ -272,7 +287,7 @@ def measure(seeds: range) -> dict[str, list[list[str]]]:
     return {
         "attacked": attacked(),
         "losses": curve(losses, SIZES, seeds),
-        "delays": curve({**delays, **bursts, **apart}, (4, 8), seeds),
+        "delays": curve({**delays, **bursts, **apart}, SIZES[1:], seeds),
         "manoeuvres": curve(hard, (4, 8), seeds),
         "cost": cost(),
         "flights": flights(seeds),

@@ -45,7 +45,9 @@ def test_who_decides_is_compared_over_one_radio(tmp_path: Path) -> None:
     done = colift("compare", *chosen, "--out", "out", "--json", folder=tmp_path)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    assert {"central", "leaderless", "exchange-admm"} <= {*result["agents"]}
+    assert {"central", "leaderless", "exchange-admm", "leader", "distributed-mpc"} <= {
+        *result["agents"]
+    }
     for found in result["agents"].values():
         assert found["flights"] == found["held"] == 2
         low, high = found["intervals"]["tracking_rms_m"]
