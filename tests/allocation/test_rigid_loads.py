@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -206,6 +208,18 @@ def test_no_answer_breaks_a_limit(n, noise):
     assert Status.CONVERGED in seen
     if noise == 0.0 and n > 2:
         assert seen == {Status.CONVERGED}
+
+
+def test_who_is_too_near_is_parted_at_no_others_cost(monkeypatch):
+    """After 201 s of the table's smooth wrenches sixteen drones stand at their distance all around, and the load's turn brings two of them 0.01 mm too near."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs" / "figures")
+    script = importlib.import_module("rigid_allocation")
+    team, part = script.team_of(16), script.judge_of(16)
+    asked = script.asked("smooth", 20_160, team, part.turn_rate(team))
+    answers = script.run(part, team, asked)
+    broken = script.violations(part, team, asked, answers.pulls)
+    assert max(broken.values()) <= 0.0, broken
+    assert set(answers.state[:, 0]) == {Status.CONVERGED}
 
 
 def test_a_wrench_gives_way_in_order_yaw_first_the_weight_last():

@@ -50,6 +50,8 @@ AHEAD = 1.5
 """Of the wanted attitude's next turn, what distances and cones keep for it."""
 BUFFER, BUFFER_ANGLE = 1e-3, math.radians(0.1)
 """What they keep anyhow, m, rad."""
+PARTED = 1e-5
+"""By how much farther apart than asked a pair that is too near is turned where there is no room for more, m."""
 FADE = 0.75
 """Part of what is left of it that a pair keeps within a cycle, where its buffer is used up."""
 ROUNDING = 1e-9
@@ -254,17 +256,20 @@ def watch(n, delta, ahead, moved, params, length, rest, pairs, data):  # type: i
             for c in range(3):
                 data[WIDTH * i + R.best + c] = data[WIDTH * i + R.w + c]
         for p in range(m):
-            push(PAIR * p, n, flat, delta, length, pairs, data)
+            push(PAIR * p, n, flat, delta, pairs[PAIR * p + V.z], length, pairs, data)
         worse = False
         for p in range(m):
             o = PAIR * p
             kind, i, j = int(pairs[o + V.kind]), int(pairs[o + V.i]), int(pairs[o + V.j])
             size, _, _, _, _, _ = between(kind, i, j, flat, length, data)
             worse = worse or size < 0.5 * (pairs[o + V.g] + pairs[o + V.least])
-        if worse and not wrong:  # what helps one pair would cost another one its room
+        if worse:  # what helps one pair would cost another one its room: only who is too near is parted, and no more than that
             for i in range(n):
                 for c in range(3):
                     data[WIDTH * i + R.w + c] = data[WIDTH * i + R.best + c]
+            for p in range(m):
+                if wrong and pairs[PAIR * p + V.g] <= pairs[PAIR * p + V.least] * (1.0 + ROUNDING):
+                    push(PAIR * p, n, flat, delta, PARTED, length, pairs, data)
     for p in range(m):
         o = PAIR * p
         kind, i, j = int(pairs[o + V.kind]), int(pairs[o + V.i]), int(pairs[o + V.j])
@@ -282,11 +287,11 @@ def watch(n, delta, ahead, moved, params, length, rest, pairs, data):  # type: i
 
 
 @inline
-def push(o, n, flat, delta, length, pairs, data):  # type: ignore[no-untyped-def]
-    """Turn both cables of a pair apart, by what its buffer lacks, and by no more than half of the largest turn together."""
+def push(o, n, flat, delta, room, length, pairs, data):  # type: ignore[no-untyped-def]
+    """Turn both cables of a pair apart, by what it lacks of its distance and this ``room``, m, and by no more than half of the largest turn together."""
     kind, i, j = int(pairs[o + V.kind]), int(pairs[o + V.i]), int(pairs[o + V.j])
     size, nx, ny, nz, u, v = between(kind, i, j, flat, length, data)
-    lack = pairs[o + V.least] + pairs[o + V.z] - size
+    lack = pairs[o + V.least] + room - size
     if lack <= 0.0:
         return
     if size < 1e-6:  # no direction is better than another
