@@ -126,9 +126,9 @@ def _tell(result: dict[str, Any]) -> None:
     for each in result["killed"]:
         settled = each["settled"]
         found = (
-            "two seconds later the force still misses more than 5 % of the weight."
+            "two seconds later the force still misses more than 2 % of the weight."
             if settled is None
-            else f"within 5 % of the weight after {1e3 * settled:.0f} ms."
+            else f"within 2 % of the weight after {1e3 * settled:.0f} ms."
         )
         out.print(f"Drone {each['drone']} killed at {each['at']:g} s: {found}", highlight=False)
 

@@ -27,7 +27,7 @@ from colift.mission import load_mission
 from colift.mission.mission import Mission
 from colift.team.geometry import Array, min_norm_tensions
 
-WHOLE = 0.05
+WHOLE = 0.02
 """Share of the weight that may be missing of a force that is whole."""
 WATCHDOG = 0.05
 """Time without an answer after which a drone pulls no more, s."""
@@ -73,7 +73,7 @@ class Flown:
     pulls : list of (n, 3)
         What each drone did to the load, N.
     wished : list of (3,)
-        What those that answered wanted all to do, on average, N; where nobody did, what was wanted last.
+        What those that answered wanted all to do, on average, with a motor's lag, N; where nobody did, what was wanted last.
     hears : list of (n,)
         Whom each heard, a bit for each number; 0 for those that did not answer.
     status : list of (n,)
@@ -179,7 +179,7 @@ class Swarm:
         self.load[0] = mission.reference.sample(np.zeros(1), team)[0, 0]
         self._bias = BIAS * self._rng.standard_normal((self.n, 3)) / np.sqrt(3.0)
         self._last: list[Command | None] = [None] * self.n
-        self._wished = weight
+        self._wish, self._wished = weight, weight.copy()
         self._directions, self._tensions = directions.copy(), tensions.copy()
 
     def _bound(self) -> socket.socket:
@@ -321,7 +321,7 @@ class Swarm:
         hears, status, wanted = [0] * n, [-1] * n, np.zeros((n, 3))
         answers = [last for last in self._last if last is not None and last.cycle == cycle]
         if answers:
-            self._wished = np.mean([answer.wish for answer in answers], axis=0)
+            self._wish = np.mean([answer.wish for answer in answers], axis=0)
         for answer in answers:
             hears[answer.number], status[answer.number] = answer.hears, answer.status
         for drone, last in enumerate(self._last):
@@ -332,12 +332,13 @@ class Swarm:
         h = self.dt / SUBSTEPS
         for _ in range(SUBSTEPS):
             self.pulls += h / (h + LAG) * (wanted - self.pulls)
+            self._wished += h / (h + LAG) * (self._wish - self._wished)
             self.load[1] += h * (self.pulls.sum(axis=0) / mass - np.array([0.0, 0.0, team.gravity]))
             self.load[0] += h * self.load[1]
         flown = self.flown
         flown.load.append(self.load[0].copy())
         flown.wanted.append(self.mission.reference.sample(np.array([cycle * self.dt]), team)[0, 0])
         flown.pulls.append(self.pulls.copy())
-        flown.wished.append(self._wished)
+        flown.wished.append(self._wished.copy())
         flown.hears.append(hears)
         flown.status.append(status)
