@@ -38,6 +38,8 @@ def test_whichever_process_is_killed_the_force_is_whole_again_soon(drone):
     first = round(4.0 / flown.dt)
     assert flown.missing[first : first + 30].max() > 0.2 * weight
     assert flown.settled(4.0, world.WHOLE, weight) <= PATIENCE + ALLOWED
+    behind = np.linalg.norm(np.sum(flown.pulls, axis=1) - flown.asked, axis=1)
+    assert behind[first + 30 : first + 200].max() < 0.05 * weight
     away = np.linalg.norm(np.array(flown.load) - np.array(flown.wanted), axis=1)
     assert away.max() < 0.1
     assert all(row[drone] == -1 for row in flown.status[first + 1 :])

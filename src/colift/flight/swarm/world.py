@@ -74,6 +74,8 @@ class Flown:
         What each drone did to the load, N.
     wished : list of (3,)
         What those that answered wanted all to do, on average, with a motor's lag, N; where nobody did, what was wanted last.
+    asked : list of (3,)
+        The same before that lag.
     hears : list of (n,)
         Whom each heard, a bit for each number; 0 for those that did not answer.
     status : list of (n,)
@@ -85,6 +87,7 @@ class Flown:
     load: list[Array] = field(default_factory=list)
     wanted: list[Array] = field(default_factory=list)
     pulls: list[Array] = field(default_factory=list)
+    asked: list[Array] = field(default_factory=list)
     wished: list[Array] = field(default_factory=list)
     hears: list[list[int]] = field(default_factory=list)
     status: list[list[int]] = field(default_factory=list)
@@ -339,6 +342,7 @@ class Swarm:
         flown.load.append(self.load[0].copy())
         flown.wanted.append(self.mission.reference.sample(np.array([cycle * self.dt]), team)[0, 0])
         flown.pulls.append(self.pulls.copy())
+        flown.asked.append(self._wish)
         flown.wished.append(self._wished.copy())
         flown.hears.append(hears)
         flown.status.append(status)
