@@ -73,8 +73,7 @@ def test_cables_stay_apart_whatever_is_lost_and_all_agree_once_it_is_calm(n):
 @pytest.mark.parametrize("name", MUTANTS)
 def test_one_wrong_line_is_caught(name, tmp_path):
     made = mutant(name, tmp_path)
-    judged = [hostility.attack(4, seed, 8_000, made) for seed in range(8)]
-    assert not all(each.good for each in judged)
+    assert any(not hostility.attack(4, seed, 8_000, made).good for seed in range(8))
 
 
 VECTORS = (
