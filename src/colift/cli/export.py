@@ -23,8 +23,9 @@ from colift.cli.base import (
 )
 
 OURS = ("colift.h", "colift_team.h")
+OUR_APP = ("app-config",)
 
-Kind = Literal["c", "mjcf", "urdf", "sdf", "bag", "csv", "parquet", "rerun"]
+Kind = Literal["c", "crazyflie", "mjcf", "urdf", "sdf", "bag", "csv", "parquet", "rerun"]
 FLIGHTS = {"bag": ".mcap", "csv": ".csv", "parquet": ".parquet", "rerun": ".rrd"}
 """What recordings become, and how the names of their files end."""
 
@@ -34,7 +35,7 @@ def export(
     kind: Annotated[
         Kind,
         typer.Argument(
-            help="Of a mission: c, mjcf, urdf, sdf; of a recording: bag, csv, parquet, rerun.",
+            help="Of a mission: c, crazyflie, mjcf, urdf, sdf; of a recording: bag, csv, parquet, rerun.",
             metavar="FORMAT",
         ),
     ],
@@ -47,7 +48,9 @@ def export(
     ] = "paper-spiral",
     target: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder (c) or file to write.", show_default="in this folder"),
+        typer.Option(
+            "--out", help="Folder (c, crazyflie) or file to write.", show_default="in this folder"
+        ),
     ] = None,
     float32: Annotated[bool, typer.Option("--float32", help="C in single precision.")] = False,
     embedded: Annotated[
@@ -67,7 +70,7 @@ def export(
     extra: With = None,
     as_json: Json = False,
 ) -> None:
-    """Write a mission's controllers as C99 (c), its team as a model for other simulators, or a recording in another program's format.
+    """Write a mission's controllers as C99 (c) or as an app of the Crazyflie's firmware (crazyflie), its team as a model for other simulators, or a recording in another program's format.
 
     C is translated from the kernels that Python runs: no malloc, no globals. Its test calls each kernel along a flight and compares
     with Python's answers, bit for bit. What C would not do in the same way is refused, with file and line.
@@ -76,6 +79,7 @@ def export(
 
       colift export c --embedded --set allocation.kind=safe --part allocation --out allocator
       colift export c noisy-spiral --out controllers && make -C controllers check
+      colift export crazyflie crazyflie-trio --out app
       colift export mjcf four-to-three --out team.xml
       colift export bag runs/hover-20260101-120000 --out hover.mcap
     """
@@ -96,6 +100,8 @@ def export(
             (float32, embedded),
             as_json=as_json,
         )
+    elif kind == "crazyflie":
+        _crazyflie(source, target or Path("colift-crazyflie"), sets, extra, as_json=as_json)
     else:
         _model(kind, source, target, sets, extra, as_json=as_json)
 
@@ -129,15 +135,35 @@ def _c(
         if "allocation" in names and (float32 or embedded):
             loaded = module.profiled(loaded, EMBEDDED if embedded else SINGLE)
         files = module.files_of(loaded, names, single=float32 or embedded)
-    written = module.write(files, folder)
+    module.write(files, folder)
+    _tell_folder(folder, files, f"`make -C {folder} check`", as_json=as_json)
+
+
+def _crazyflie(source: str, folder: Path, sets: Sets, extra: With, *, as_json: bool) -> None:
+    check_out(folder, OUR_APP)
+    with loading():
+        from colift.deploy.c.crazyflie import files_of
+        from colift.deploy.c.export import write
+        from colift.mission.load import load_mission, parse_overrides
+        from colift.mission.warnings import notes_of
+
+        load_parts(extra)
+        mission = load_mission(source, parse_overrides(sets))
+        show_notes(notes_of(mission))
+        files = files_of(mission)
+    write(files, folder)
+    command = f"`make -C {folder} CRAZYFLIE_BASE=path/to/crazyflie-firmware`"
+    _tell_folder(folder, files, command, as_json=as_json)
+
+
+def _tell_folder(folder: Path, files: dict[str, str], command: str, *, as_json: bool) -> None:
+    """Say what was written, and what to do with it."""
     if as_json:
-        emit({"folder": str(folder), "files": sorted(written)})
+        emit({"folder": str(folder), "files": sorted(files)})
         return
     lines = sum(text.count("\n") for text in files.values())
     out.print(
-        f"{folder}: {len(written)} files, {lines} lines of C; `make -C {folder} check`",
-        markup=False,
-        soft_wrap=True,
+        f"{folder}: {len(files)} files, {lines} lines; {command}", markup=False, soft_wrap=True
     )
 
 

@@ -117,7 +117,7 @@ def files_of(
     }
     files = {f"{layer.kernel.name}.c": layer.kernel.file("colift.h") for layer in layers}
     files["colift.h"] = header_of([layer.kernel for layer in layers])
-    files["colift_team.h"], files["colift_team.c"] = _team(layers, len(flight.drones))
+    files["colift_team.h"], files["colift_team.c"] = team_of(layers, len(flight.drones))
     table, tests = "", {}
     if cascade:
         files |= cascade.files()
@@ -131,7 +131,7 @@ def files_of(
     return files
 
 
-def _team(layers: Sequence[Layer], n: int) -> tuple[str, str]:
+def team_of(layers: Sequence[Layer], n: int) -> tuple[str, str]:
     """Header and source of what the kernels are told of the mission's team."""
     real = layers[0].kernel.program.real
     head = ["#ifndef COLIFT_TEAM_H", "#define COLIFT_TEAM_H", "", f"#define COLIFT_DRONES {n}", ""]
@@ -172,8 +172,8 @@ def _team(layers: Sequence[Layer], n: int) -> tuple[str, str]:
 
 def write(files: Mapping[str, str], folder: Path) -> dict[str, Path]:
     """Write them, each whole or not at all."""
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return {name: folder / name for name in files}

@@ -22,3 +22,5 @@ EMBEDDED = {
 }
 """The same with a bound on the work of a call, which the next call goes on with: at most 168,000 instructions of a
 Cortex-M4F for up to four drones."""
+FAST = ("-O3", "-fno-math-errno")
+"""For gcc, the same answers with a sixth less instructions of a Cortex-M4F: more is inlined, and no root asks whether its number was negative."""

@@ -1,12 +1,12 @@
-// The whole cascade as one function: from what is measured and wanted to each drone's thrust and moment.
+// Layers as one function: from what is measured and wanted to what each drone does.
 
-#ifndef COLIFT_CASCADE_H
-#define COLIFT_CASCADE_H
+#ifndef @GUARD@
+#define @GUARD@
 
 #include "colift.h"
 #include "colift_team.h"
 
-#define COLIFT_STEP @STEP@ // time from one step to the next, s
+#define @PERIOD@_STEP @STEP@ // time from one step to the next, s
 
 // Each drone may run a cascade of its own, and fly its own row: thrusts[i], torques[3 * i] to torques[3 * i + 2].
 // A row a drone; what has a row more ends with the load's. Units and frames: colift's table of signals.
@@ -18,11 +18,11 @@ typedef struct {
     int status; // of the allocator
     // Their memories.
 @MEMORY@
-} colift_cascade;
+} @NAME@;
 
-void colift_cascade_start(colift_cascade *c);
+void @NAME@_start(@NAME@ *c);
 
 // Call the layers that are due at this step, which is counted from 0.
-void colift_step(colift_cascade *c, int step);
+void @FUNCTION@(@NAME@ *c, int step);
 
 #endif

@@ -1,0 +1,6 @@
+#pragma once
+
+#include "FreeRTOS.h"
+
+TickType_t xTaskGetTickCount(void);
+void vTaskDelayUntil(TickType_t *, TickType_t);
