@@ -390,18 +390,20 @@ class PartTables(SphinxDirective):
 
 
 class TopicTable(SphinxDirective):
-    """The topics of the ROS nodes."""
+    """The topics of the ROS nodes: what they hold, and how it travels."""
 
     def run(self) -> list[nodes.Node]:
-        rows = [
-            [
-                code(each.name), code(each.type.replace("/msg/", "/")), each.writer, each.holds, each.unit, each.frame,
-                str(each.quality), each.every.replace("_", " "),
-            ]
-            for each in TOPICS.values()
-        ]  # fmt: skip
+        every = TOPICS.values()
+        what = [
+            [code(t.name), code(t.type.replace("/msg/", "/")), t.writer, t.holds] for t in every
+        ]
+        how = [
+            [code(t.name), t.unit, t.frame, str(t.quality), t.every.replace("_", " ")]
+            for t in every
+        ]
         return [
-            table(["topic", "message", "from", "holds", "unit", "frame", "quality", "period"], rows)
+            table(["topic", "message", "from", "holds"], what),
+            table(["topic", "unit", "frame", "quality", "period"], how),
         ]
 
 

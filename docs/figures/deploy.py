@@ -1,19 +1,18 @@
 """Write what docs/deploy.md says of exported kernels: whether they compute what Python computes, and what a Cortex-M needs for them.
 
-python docs/figures/deploy.py [--fly]
+python docs/figures/deploy.py [--fly [identity] [chip] [single]]
 
-From ``deploy.json`` beside this file, which ``--fly`` makes first (half an hour on two cores); it needs gcc, make, and the Debian
-packages that ``colift.deploy.c.machines`` names.
+From ``deploy.json`` beside this file, which ``--fly`` makes first, all of it (an hour on two cores) or what is named; it needs gcc, make, and
+the Debian packages that ``colift.deploy.c.machines`` names.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from pages import fill, stored, table
+from pages import fill, stored_parts, table
 
 os.environ["NUMBA_CPU_NAME"] = "generic"  # fuses nothing, as C
 
@@ -31,7 +30,7 @@ ALLOCATORS: dict[str, tuple[str, dict[str, Any]]] = {
     "safe, limited thrust": ("safe", LIMITED),
 }
 DRONES = (1, 2, 3, 4, 6, 9, 16)
-COUNTS = {"x86-64": 15_000, "wasm": 15_000, "clang": 5_000, "aarch64": 500, "m7": 100}
+COUNTS = {"x86-64": 15_000, "wasm": 15_000, "aarch64": 15_000, "clang": 5_000, "m7": 100}
 """Calls of each allocator, team and kind of force."""
 ON_CHIP, HOSTILE = 1_000, 5_000
 FIRST = 700
@@ -121,20 +120,25 @@ def _do(job: tuple[Any, ...]) -> Any:
     return globals()[function](*arguments)
 
 
-def jobs() -> Iterator[tuple[Any, ...]]:
-    """All that is measured."""
-    yield from (("identity", name, case) for name in ALLOCATORS for case in reversed(CASES))
-    yield from (("chip", name, n, "single") for name in ALLOCATORS for n in (3, 4, 6))
-    yield from (("chip", name, n, "embedded") for name in ALLOCATORS for n in (1, 2, 3, 4))
-    yield from (("single", name, n) for name in ALLOCATORS for n in (2, 3, 4, 6, 8))
+JOBS: dict[str, list[tuple[Any, ...]]] = {
+    "identity": [("identity", name, case) for name in ALLOCATORS for case in reversed(CASES)],
+    "chip": [
+        ("chip", name, n, profile)
+        for profile, drones in (("single", (3, 4, 6)), ("embedded", (1, 2, 3, 4)))
+        for name in ALLOCATORS
+        for n in drones
+    ],
+    "single": [("single", name, n) for name in ALLOCATORS for n in (2, 3, 4, 6, 8)],
+}
+"""All that is measured, by part."""
 
 
-def measure() -> dict[str, Any]:
-    """All of it, on two cores."""
-    todo = list(jobs())
+def measure(parts: list[str]) -> dict[str, Any]:
+    """Parts of it, on two cores."""
+    todo = [job for part in parts for job in JOBS[part]]
     with ProcessPoolExecutor(2) as pool:
         found = list(pool.map(_do, todo))
-    result: dict[str, Any] = {"identity": {}, "chip": [], "single": []}
+    result: dict[str, Any] = {part: {} if part == "identity" else [] for part in parts}
     for job, each in zip(todo, found, strict=True):
         if job[0] == "identity":
             result["identity"].setdefault(job[1], {})[job[2]] = each
@@ -150,8 +154,8 @@ def of(pair: list[int]) -> str:
 
 
 def k(value: float) -> str:
-    """Instructions in thousands."""
-    return f"{value / 1000:.3g} k"
+    """Instructions in thousands or millions."""
+    return f"{value / 1e6:.3g}\u00a0M" if value >= 999_500 else f"{value / 1000:.3g}\u00a0k"
 
 
 def of_identity(found: Any) -> str:
@@ -170,7 +174,7 @@ def of_chip(found: Any) -> str:
         [
             f"{e['allocator']}, n = {e['drones']}", k(e["smooth"]["mean"]),
             *(k(e["noisy"][x]) for x in ("mean", "p99", "max")), k(e["rough"]["max"]),
-            str(e["stack"]), str(e["ram"]), f"{e['code'] / 1000:.1f} kB",
+            str(e["stack"]), str(e["ram"]), f"{e['code'] / 1000:.1f}\u00a0kB",
         ]
         for e in found
         if e["profile"] == "single"
@@ -217,7 +221,7 @@ def _beyond(row: dict[str, Any], key: str) -> str:
 
 def main() -> None:
     """Write the tables."""
-    found = stored(__file__, measure)
+    found = stored_parts(__file__, JOBS, measure)
     fill("deploy.md", "identity", of_identity(found["identity"]))
     fill("deploy.md", "chip", of_chip(found["chip"]))
     fill("deploy.md", "embedded", of_budget(found["chip"]))
