@@ -1,7 +1,7 @@
 """Write the tables of docs/stress.md: ``python docs/figures/stress.py [--fly] [--seeds 240] [--out DIR]``.
 
 From ``stress.json`` beside this file. With ``--fly`` the campaigns of :data:`CAMPAIGNS` are flown first, into a folder
-each of DIR, where an interrupted call goes on; their seeds begin at :data:`FIRST_SEED`, which no tuning has seen.
+each of DIR, where an interrupted call goes on; their seeds begin at :data:`FIRST_SEED`, or those of :data:`FRESH`, which no tuning has seen.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from pages import DOCS, fill, table
 from colift.kernel.math import shares
 
 RESULTS = Path(__file__).with_suffix(".json")
-FIRST_SEED = 43_000
+FIRST_SEED, FRESH = 43_000, {"fresh": 47_000, "taut": 47_000}
 SOME = (
     "calm;wind;all, load +50 %;all, load -50 %;cable cut;drone dead, on its cable;one motor dead;"
     "drone's sensors stuck for good"
@@ -42,6 +42,31 @@ CAMPAIGNS = {
         ],
         4,
     ),
+    "fresh": (["--conditions", "all, load -50 %"], 2),
+    "taut": (
+        [
+            "--conditions",
+            "all, load -50 %",
+            "--set",
+            "allocation.tension_min=0.39",
+            "--set",
+            "load_control.rate=0.6",
+        ],
+        2,
+    ),
+    "soft": (
+        [
+            "--conditions",
+            "wind;all, load +50 %;all, load -50 %;cable cut in wind;one motor dead in wind",
+            "--set",
+            "drones.rotor_drag=0.05",
+            "--set",
+            "disturbance.3.rotor_drag=0.05",
+            "--set",
+            "position_control.gain=0.6",
+        ],
+        12,
+    ),
     "plants": (
         [
             "--allocators",
@@ -61,7 +86,8 @@ def fly(seeds, folder):
     """Fly what is not there yet, and keep what the page shows of it."""
     found = {}
     for name, (arguments, part) in CAMPAIGNS.items():
-        asked = ["--seeds", str(max(1, seeds // part)), "--first-seed", str(FIRST_SEED), *arguments]
+        first = str(FRESH.get(name, FIRST_SEED))
+        asked = ["--seeds", str(max(1, seeds // part)), "--first-seed", first, *arguments]
         command = [sys.executable, "-m", "colift", "stress", MISSION, *asked, "--replays", "0"]
         subprocess.run([*command, "--out", str(folder / name)], check=True)
         result = json.loads((folder / name / "stress.json").read_text())
@@ -155,7 +181,10 @@ def main():
     for name, write in (
         ("weather", single),
         ("faults", single),
+        ("fresh", single),
+        ("taut", single),
         ("drag", single),
+        ("soft", single),
         ("storm", storm),
         ("plants", plants),
     ):

@@ -13,6 +13,7 @@ from colift.control.allocation.limits.hover import RESERVE
 from colift.errors import MissionError
 from colift.flight.flight import Flight
 from colift.mission import load_mission
+from colift.mission.warnings import warnings_of
 from colift.record import metrics
 from terminal import colift
 
@@ -170,3 +171,19 @@ def test_gusts_that_swing_the_load_of_one_drone_are_refused_unless_that_is_allow
     mission = load_mission({**BLOWN, "criteria": {"tracking_max_m": {"max": 5.0}}})
     error = np.linalg.norm(metrics.tracking_error(Flight(mission).run()), axis=1)
     assert error[len(error) // 2 :].max() == pytest.approx(float(found[1]), rel=0.5)
+
+
+def test_wind_that_leans_the_load_further_than_a_cable_may_is_refused_and_nearly_so_far_warned_of():
+    three = {**BLOWN, "drones": {**BLOWN["drones"], "count": 3}}
+    with pytest.raises(MissionError) as refused:
+        load_mission({**three, "load": {"mass": 0.1}})
+    (problem,) = refused.value.problems
+    lean, most = map(float, re.findall(r"([0-9.]+) degrees, more than the ([0-9.]+)", problem.message)[0])  # fmt: skip
+    assert lean > most == 75.0
+    (warning,) = warnings_of(load_mission({**three, "load": {"mass": 0.13}}))
+    assert warning.path == "disturbance"
+    assert 70.0 < float(re.findall(r"leans by ([0-9.]+) degrees", warning.message)[0]) < most
+    assert warnings_of(load_mission({**three, "load": {"mass": 0.17}})) == []
+    narrow = {**three, "load": {"mass": 0.17}, "allocation": {"max_cone_deg": 60.0}}
+    with pytest.raises(MissionError, match=r"more than the 60 .*max_cone_deg"):
+        load_mission(narrow)

@@ -283,7 +283,7 @@ def hover_checks(
         bound = frame.criteria.get("tracking_max_m")
         allowed = math.inf if bound is None or bound.max is None else bound.max
         those = [part.of(drones) for part in disturbances]
-        ahead = forecast(team, hover, thrusts, those)
+        ahead = forecast(team, hover, thrusts, allocation, those)
         for layer, message in ahead.problems(team, allowed):
             yield Problem(layer, "", message)
     for layer, message in conflicts.items():

@@ -22,10 +22,10 @@ from colift.world.disturbance.base import DisturbancePart
 
 Array = NDArray[np.float64]
 
-MOST_THRUST = 0.87
-"""Share of a drone's thrust from which the wind's strongest may leave it nothing to turn with."""
-MOST_LEAN = math.radians(70.0)
-"""Lean of the load in the wind beyond which three cables or more cannot all stay taut."""
+MUCH_THRUST, MOST_THRUST = 0.87, 1.0
+"""Shares of a drone's thrust from which the wind's strongest may leave it little to turn with, and from which it cannot stay."""
+WIDE_LEAN = math.radians(70.0)
+"""Lean of the load in gusts from which some of three cables or more may go slack."""
 
 SWINGS = 0.9
 """How far gusts swing the load of one or two drones, over by how much more than the steady wind they would lean it."""
@@ -43,6 +43,8 @@ class Forecast:
         What each drone needs in it, N.
     limits : (n,) array
         What each has, N; inf where nobody knows.
+    cone : float
+        Most that a cable may lean, from the vertical, rad.
     lean : float
         Of the force that holds the load, from the vertical, rad.
     offset : float
@@ -55,6 +57,7 @@ class Forecast:
     wind: Array
     thrusts: Array
     limits: Array
+    cone: float
     lean: float
     offset: float
     swing: float
@@ -70,17 +73,12 @@ class Forecast:
         if speed == 0.0:
             return
         if self.thrust > MOST_THRUST:
-            i = int(np.argmax(self.thrusts / self.limits))
-            yield (
-                "actuation",
-                f"in {speed:.3g} m/s of wind drone {i} needs {self.thrusts[i]:.4g} N of thrust to stay, of the {self.limits[i]:.4g} N "
-                f"that it has; beyond {100.0 * MOST_THRUST:g} % nothing is left to turn with",
-            )
-        if team.n >= 3 and self.lean > MOST_LEAN:
+            yield "actuation", f"{self._needed()} that it has"
+        if team.n >= 3 and self.lean > self.cone:
             yield (
                 "disturbance",
-                f"{speed:.3g} m/s of wind push the load of {team.load_mass:.4g} kg so hard that it leans by {math.degrees(self.lean):.3g} "
-                f"degrees, where not all of {team.n} cables can stay taut (at most {math.degrees(MOST_LEAN):g})",
+                f"{speed:.3g} m/s of wind push the load of {team.load_mass:.4g} kg so hard that it leans by {math.degrees(self.lean):.3g} degrees, "
+                f"more than the {math.degrees(self.cone):g} by which a cable may (allocation.max_cone_deg)",
             )
         if team.n <= 2 and self.offset > allowed:
             yield (
@@ -96,14 +94,35 @@ class Forecast:
                 "a tenth of a cable or 0.1 m; criteria.tracking_max_m, where it is given, takes the place of this bound",
             )
 
+    def doubts(self, team: Team) -> Iterable[tuple[str, str]]:
+        """What may go wrong with it, likewise: most such flights hold the load, and some do not."""
+        speed = float(np.linalg.norm(self.wind))
+        if speed == 0.0:
+            return
+        if MUCH_THRUST < self.thrust <= MOST_THRUST:
+            most = f"beyond {100.0 * MUCH_THRUST:g} % little is left to turn with"
+            yield "actuation", f"{self._needed()} that it has; {most}"
+        if team.n >= 3 and WIDE_LEAN < self.lean <= self.cone:
+            yield (
+                "disturbance",
+                f"{speed:.3g} m/s of wind push the load of {team.load_mass:.4g} kg so hard that it leans by {math.degrees(self.lean):.3g} "
+                f"degrees; from {math.degrees(WIDE_LEAN):g} on some of {team.n} cables may go slack in gusts, and the load swings",
+            )
+
+    def _needed(self) -> str:
+        """What the drone needs that has least to spare, and has."""
+        i, speed = int(np.argmax(self.thrusts / self.limits)), float(np.linalg.norm(self.wind))
+        return f"in {speed:.3g} m/s of wind drone {i} needs {self.thrusts[i]:.4g} N of thrust to stay, of the {self.limits[i]:.4g} N"
+
 
 def forecast(
     team: Team,
     hover: Allocation,
     limits: Array,
+    allocation: Part,
     disturbances: Sequence[Part],
 ) -> Forecast:
-    """Judge a team that hovers as its allocator has it; ``limits`` (n,) is the thrust of each drone, N."""
+    """Judge a team that hovers as its ``allocation`` has it; ``limits`` (n,) is the thrust of each drone, N."""
     parts = [each for each in disturbances if isinstance(each, DisturbancePart)]
     wind = np.sum([np.zeros(3), *(each.strongest_wind() for each in parts)], axis=0)
     steady = np.sum([np.zeros(3), *(p.strongest_wind() for p in parts if p.steady)], axis=0)
@@ -119,8 +138,9 @@ def forecast(
         longest * math.hypot(push[-1, 0], push[-1, 1]) / weight
         for push in (pushes, _pushes(team, hover, parts, steady))
     )
-    lean = math.atan(offset / longest)
-    return Forecast(wind, np.hypot(up, across), limits, lean, offset, max(offset - always, 0.0))
+    lean, swing = math.atan(offset / longest), max(offset - always, 0.0)
+    cone = math.radians(getattr(allocation, "max_cone_deg", None) or 90.0)
+    return Forecast(wind, np.hypot(up, across), limits, cone, lean, offset, swing)
 
 
 def _pushes(team: Team, hover: Allocation, parts: Sequence[DisturbancePart], wind: Array) -> Array:

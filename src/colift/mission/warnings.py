@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from colift.control.allocation.limits.hover import hovering
 from colift.errors import Problem
+from colift.mission.forecast import forecast
 from colift.mission.stability import margin_warnings
 from colift.part import FOLDERS, LISTS, placed
 from colift.team.holding import holding
@@ -40,8 +42,24 @@ def warnings_of(mission: Mission) -> list[Problem]:
                 shown = f"{value:g}" if isinstance(value, float) else str(value)
                 found.append(Problem(where, shown, message))
     found += margin_warnings(mission)
+    found += wind_warnings(mission)
     found += _holding_warnings(mission)
     return found
+
+
+def wind_warnings(mission: Mission) -> list[Problem]:
+    """What strong wind may do to the load; what it surely does is a mistake of the mission."""
+    drones = mission.first_drones()
+    team, allocation = mission.team.of(drones), mission.allocation.of(drones)
+    if team.gravity == 0.0 or not any(part.feels_wind for part in mission.disturbance):
+        return []
+    limits = mission.actuation.of(drones).thrust_limits(team)
+    hover, _ = hovering(
+        team, allocation, limits, mission.start_directions(), mission.timing.allocation
+    )
+    blows = [part.of(drones) for part in mission.disturbance]
+    ahead = forecast(team, hover, limits, allocation, blows)
+    return [Problem(layer, "", message) for layer, message in ahead.doubts(team)]
 
 
 def _holding_warnings(mission: Mission) -> list[Problem]:

@@ -19,6 +19,7 @@ from colift.mission.forecast import forecast
 from colift.mission.load import layered, load_mission
 from colift.mission.mission import Mission
 from colift.mission.outlook import FEWEST, Outlook, lost_one_by_one
+from colift.mission.warnings import wind_warnings
 from colift.study.size import CLOSE, STEPS, Question, are_alike
 from colift.team.geometry import Array
 from colift.team.load import edge_attachments, usual_attachments
@@ -155,6 +156,8 @@ class Rigid:
             mission = self.mission(None, must_fly=True, **changes)
         except MissionError as error:
             return Verdict(str(error.problems[0]), {})
+        for doubt in wind_warnings(mission):
+            return Verdict(str(doubt), {})
         losses, leaning = {}, {}
         for drone, found, reason in _losses(mission) if spare else ():
             losses[drone], leaning[drone] = reason, found
@@ -221,8 +224,8 @@ def _blown_down(mission: Mission, drones: list[int], hanging: Outlook) -> str:
     hover = allocation.hover(team, directions, mission.timing.allocation)
     limits = mission.actuation.of(drones).thrust_limits(team)
     blows = [part.of(drones) for part in mission.disturbance]
-    problems = forecast(team, hover, limits, blows).problems(team, math.inf)
-    return next((said for _, said in problems), "")
+    ahead = forecast(team, hover, limits, allocation, blows)
+    return next((said for _, said in (*ahead.problems(team, math.inf), *ahead.doubts(team))), "")
 
 
 def _alike(ends: Array, others: Array) -> bool:

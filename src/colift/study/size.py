@@ -209,11 +209,11 @@ class Crew:
             return Judgement(False, name, message, none, none, limits, math.nan)
         hover, conflicts = self.settled()
         thrusts = team.hover_thrusts(hover.tensions, hover.directions)
-        ahead = forecast(team, hover, limits, self.disturbances)
+        ahead = forecast(team, hover, limits, self.allocation, self.disturbances)
         for layer, said in conflicts.items():
             limit = NAMES["max_thrust"] if layer == "actuation" else ""
             return Judgement(False, limit, said, none, none, limits, math.nan)
-        for layer, said in ahead.problems(team, self.allowed):
+        for layer, said in (*ahead.problems(team, self.allowed), *ahead.doubts(team)):
             return Judgement(
                 False, IN_WIND[layer], said, thrusts, ahead.thrusts, limits, ahead.lean
             )
