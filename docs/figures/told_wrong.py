@@ -1,6 +1,6 @@
 """Write the tables of docs/theory/control.md on what is told wrongly: lengths, delays, ropes; and on better sensors.
 
-python docs/figures/told_wrong.py [--fly] [--seeds 6]
+python docs/figures/told_wrong.py [--fly] [--seeds 12]
 
 From ``told_wrong.json`` beside this file, which ``--fly`` makes first. No tuning saw these seeds.
 """
@@ -116,7 +116,7 @@ def measure(seeds: Iterable[int]) -> dict[str, list[list[str]]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--fly", action="store_true")
-    parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--seeds", type=int, default=12)
     count = parser.parse_known_args()[0].seeds
     found = stored(__file__, lambda: measure(range(FIRST, FIRST + count)))
     for name, (header, *lines) in found.items():
