@@ -140,19 +140,18 @@ def yield_to(places, pulls, L, obstacles, radius, apart, least, pull, rounds):  
     """Let the pulls (count, 3 n) at each place of the load give way to obstacles and to each other; they stay balanced.
 
     Each violated distance moves what violates it by its depth (Macklin et al. 2016, position-based); places follow each other
-    forth and back, so that a team files in before a gap and spreads out behind it. ``pull`` draws it to its formation.
+    forth and back, so that a team files in before a gap and spreads out behind it. ``pull`` draws each place to the pulls that it began with.
     """
     count, n = places.shape[0], L.shape[0]
     f, u, A, r = np.zeros((n, 5, 3)), np.zeros((n, 1, 3)), np.zeros((n, 1, 3, 3)), np.zeros(1)
-    home, move = pulls[0].copy(), np.zeros((n, 3))
+    home, move = pulls.copy(), np.zeros((n, 3))
     for turn in range(2):
         for step in range(1, count - 1):
             k = step if turn == 0 else count - 1 - step
             before = k - 1 if turn == 0 else k + 1
             for c in range(3 * n):
-                pulls[k, c] = (
-                    pulls[before, c] if turn == 0 else 0.5 * (pulls[k, c] + pulls[before, c])
-                )
+                carried = pulls[before, c] + home[k, c] - home[before, c]
+                pulls[k, c] = carried if turn == 0 else 0.5 * (pulls[k, c] + carried)
             for _ in range(rounds):
                 move[:] = 0.0
                 for i in range(n):
@@ -210,7 +209,7 @@ def yield_to(places, pulls, L, obstacles, radius, apart, least, pull, rounds):  
                     for i in range(n):
                         size = math.sqrt(f[i, 0, 0] ** 2 + f[i, 0, 1] ** 2 + f[i, 0, 2] ** 2)
                         f[i, 0, c] += size / L[i] * move[i, c] + pull * (
-                            home[3 * i + c] - f[i, 0, c]
+                            home[k, 3 * i + c] - f[i, 0, c]
                         )
                         total += f[i, 0, c]
                     for i in range(n):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +24,8 @@ Numbers = NDArray[np.float64]
 Progress = Callable[[float], None]
 Found = tuple[Numbers, Numbers, float]
 """Control points of load and pulls, and the duration."""
+Judged = tuple[Found | None, Numbers]
+"""What was certified, and by how much it is beyond each limit; None and the excess of the nearest where nothing was."""
 DEGREES = (7, 5)
 FIXED = (6, 4)
 """Control points at each end that rest makes equal: five derivatives of the load's path and three of the pulls are 0."""
@@ -32,11 +34,17 @@ DENSE = 16
 """Samples an interval of the certificate, four times those of the optimisation."""
 MARGINS = np.array([0.004, 0.004, 0.012, 0.06, 0.01])
 """What is kept from each limit between samples: m, m, weights, rad/s, shares of pull."""
-COARSELY = ((0.0, 40), (3.0, 80), (1.5, 80))
+SLOWLY = (0.0, 40)
+COARSELY = ((3.0, 80), (1.5, 80))
 FINELY = ((1.0, 40), (0.3, 40))
-AGAIN = ((2.0, 30), (1.0, 30), (0.3, 40))
+AGAIN = ((6.0, 40), (2.0, 40), (0.5, 40))
 """Weights of time and iterations, on either grid: at first slow and geometric, then hurried, then ever closer to the limits."""
-POLISHES = 5
+POLISHES, ENOUGH = 5, 0.997
+"""Polishes at most, and share of the duration above which one has gained nothing."""
+SHORT = 1.7
+"""Every second attempt is hurried from so many of a drone's own times on, the others from the slow plan: on many scenes one of both ends in a poor plan."""
+DRAWN = 0.1
+"""By how much the pulls of a guess differ from the formation's, over an equal share."""
 SLOWER = 1.004
 """Factor of the duration after a plan was refused."""
 
@@ -107,6 +115,12 @@ class Limits:
         """Radius of a drone with its room, m."""
         return self.radius + self.room
 
+    def least_time(self, far: float) -> float:
+        """Time in which a drone without a load gets so far from rest to rest, m, leaning at once, s."""
+        most = self.gravity * np.sqrt(max(self.most**2 - 1.0, 0.01))
+        top = min(self.speed, np.sqrt(most * far))
+        return float(far / top + top / most)
+
     def numbers(self) -> Numbers:
         """For the kernels."""
         weight = self.drone_mass * self.gravity
@@ -131,32 +145,36 @@ def tables(intervals: int, samples: int) -> tuple[Numbers, Numbers]:
 
 
 class Grid:
-    """Tables and places in the unknowns of a spline with so many intervals, for n drones."""
+    """Tables and places in the unknowns of a spline with so many intervals, for n drones.
 
-    def __init__(self, n: int, intervals: int, samples: int = SAMPLES) -> None:
-        self.n, self.intervals, self.samples = n, intervals, samples
-        self.load, self.pulls = tables(intervals, samples)
+    From the interval ``begin`` on: what comes before it, with all derivatives where it ends, is as it was.
+    """
+
+    def __init__(self, n: int, intervals: int, samples: int = SAMPLES, begin: int = 0) -> None:
+        self.n, self.intervals, self.samples, self.begin = n, intervals, samples, begin
+        self.load, self.pulls = (whole[begin * samples :] for whole in tables(intervals, samples))
         counts, widths = [intervals + degree for degree in DEGREES], (3, 3 * (n - 1))
         keys = [
             (p - degree / 2, which, p)
             for which, (degree, fixed, count) in enumerate(zip(DEGREES, FIXED, counts, strict=True))
-            for p in range(fixed, count - fixed)
+            for p in range(begin + degree if begin else fixed, count - fixed)
         ]
-        self.index = [np.full(count, -1, dtype=np.int64) for count in counts]
+        index = [np.full(count, -1, dtype=np.int64) for count in counts]
         at = 0
         for _, which, p in sorted(keys):
-            self.index[which][p] = at
+            index[which][p] = at
             at += widths[which]
         self.unknowns = at
-        self.spans = np.zeros((intervals, 2), dtype=np.int64)
-        for j in range(intervals):
+        self.spans = np.zeros((intervals - begin, 2), dtype=np.int64)
+        for j in range(intervals - begin):
             used = [
                 (o, o + width)
-                for index, degree, width in zip(self.index, DEGREES, widths, strict=True)
-                for o in index[j : j + degree + 1]
+                for each, degree, width in zip(index, DEGREES, widths, strict=True)
+                for o in each[begin + j : begin + j + degree + 1]
                 if o >= 0
             ]
             self.spans[j] = min(a for a, _ in used), max(b for _, b in used)
+        self.index = [each[begin:] for each in index]
         self.H, self.work = np.zeros((at, at)), np.zeros((at, at))
 
 
@@ -227,6 +245,7 @@ class Attempt:
         self.rest = pulls
         self.obstacles = scene.obstacles
         self.T = np.ones(1)
+        self.short = np.inf
         self.worst = np.zeros(len(KINDS))
 
     def begin(self, places: Numbers, pulls: Numbers, grid: Grid, duration: float) -> None:
@@ -280,8 +299,9 @@ class Attempt:
 
     def improve(self, hurry: float, most: int, margins: Numbers) -> None:
         """Optimise on the grid, in so many iterations at most; time weighs ``hurry``, and stays where that is 0."""
-        problem = (*self.problem(margins), self.worst)
-        optimise(self.x, self.z, self.T, hurry, most, self.grid.work, *problem)
+        problem, begin = (*self.problem(margins), self.worst), self.grid.begin
+        x, z = self.x[begin:], self.z[begin:]
+        optimise(x, z, self.T, hurry, most, self.grid.work, *problem)
 
     def copy(self) -> Found:
         return self.x.copy(), self.z.copy(), float(self.T[0])
@@ -294,13 +314,16 @@ def excess(
     pulls: Numbers,
     duration: float,
     samples: int = DENSE,
+    begin: int = 0,
 ) -> Numbers:
-    """By how much splines are beyond each limit at their worst sample, both ends among them."""
+    """By how much splines are beyond each limit at their worst sample from the interval ``begin`` on, both ends among them."""
     K = len(load) - DEGREES[0]
+    BX, BZ = (whole[begin * samples :] for whole in tables(K, samples))
+    load, pulls, K = load[begin:], pulls[begin:], K - begin
     worst, none = np.zeros(len(KINDS)), np.zeros(0)
     ix, iz = (np.full(len(points), -1, dtype=np.int64) for points in (load, pulls))
     cost = assemble(
-        load, pulls, duration, 0, *tables(K, samples), basis(len(scene.lengths)), scene.lengths, limits.numbers(), scene.obstacles,
+        load, pulls, duration, 0, BX, BZ, basis(len(scene.lengths)), scene.lengths, limits.numbers(), scene.obstacles,
         np.zeros(5), ix, iz, np.zeros((K, 2), dtype=np.int64), np.zeros((0, 0)), none, none, worst,
     )  # fmt: skip
     return worst if np.isfinite(cost) else np.full_like(worst, np.inf)
@@ -340,11 +363,11 @@ def rest(scene: Scene, limits: Limits) -> tuple[Numbers, float]:
 
 def plan(
     scene: Scene, limits: Limits | None = None, *, seed: int = 0, seconds: float = 3.0, attempts: int = 12, margins: Numbers = MARGINS,
-    progress: Progress = lambda _: None,
+    progress: Progress = lambda _: None, clock: Callable[[], float] = time.perf_counter,
 ) -> Plan:  # fmt: skip
     """The shortest plan that was found within the attempts and, after a first one, within the time.
 
-    The same seed tries the same guesses; how many fit into ``seconds`` is the machine's, ``attempts`` alone bound a repeatable run.
+    The same seed tries the same guesses; how many fit into ``seconds`` of the ``clock`` is the machine's, ``attempts`` alone bound a repeatable run.
 
     Raises
     ------
@@ -353,25 +376,18 @@ def plan(
 
     """
     limits = limits or Limits()
-    n = len(scene.lengths)
-    began = time.perf_counter()
+    began = clock()
     pulls, moved = rest(scene, limits)
     _check_ends(scene, limits, pulls)
-    coarse, fine = Grid(n, COARSE), Grid(n, FINE)
     best: Plan | None = None
     near: Numbers | None = None
     first = 0.0
-    for k in range(attempts):
-        attempt = Attempt(scene, limits, pulls)
-        rng = np.random.default_rng([seed, k])
-        first_guess(attempt, coarse, rng, k + seed)
-        found, worst = _settle(attempt, fine, margins, best.duration if best else np.inf)
-        now = time.perf_counter() - began
+    for k, found, worst in _search(scene, limits, pulls, seed, attempts, margins):
+        now = clock() - began
         if found is not None:
             first = first or now
             x, z, T = found
-            told = {kind: float(e) for kind, e in zip(KINDS, worst, strict=True) if e > NEVER}
-            best = Plan(scene, limits, T, x, z, told, seed, k, moved, first)
+            best = Plan(scene, limits, T, x, z, by_kind(worst), seed, k, moved, first)
         elif near is None or worst.max() < near.max():
             near = worst
         progress((k + 1) / attempts)
@@ -384,7 +400,28 @@ def plan(
             f"{scene.name}: no plan in {attempts} attempts; the nearest was beyond its limit of {kind} by {near.max():.3g}. "
             "More attempts, another seed or wider limits may find one."
         )
-    return replace(best, total=time.perf_counter() - began)
+    return replace(best, total=clock() - began)
+
+
+def by_kind(worst: Numbers) -> dict[str, float]:
+    """Excess over each limit that there was."""
+    return {kind: float(e) for kind, e in zip(KINDS, worst, strict=True) if e > NEVER}
+
+
+def _search(
+    scene: Scene, limits: Limits, pulls: Numbers, seed: int, attempts: int, margins: Numbers
+) -> Iterator[tuple[int, Found | None, Numbers]]:
+    """Number of the attempt with each certified plan, which is shorter than the one before, and with each failure."""
+    n = len(scene.lengths)
+    coarse, fine = Grid(n, COARSE), Grid(n, FINE)
+    shorter = np.inf
+    for k in range(attempts):
+        attempt = Attempt(scene, limits, pulls)
+        first_guess(attempt, coarse, np.random.default_rng([seed, k]), k + seed)
+        for found, worst in _settle(attempt, fine, margins, shorter):
+            if found is not None:
+                shorter = found[2]
+            yield k, found, worst
 
 
 def _check_ends(scene: Scene, limits: Limits, pulls: Numbers) -> None:
@@ -418,44 +455,47 @@ def first_guess(attempt: Attempt, grid: Grid, rng: np.random.Generator, k: int) 
     )
     pulls = np.repeat(attempt.rest.reshape(1, -1), len(places), axis=0)
     if k > 0:
-        shift = rng.normal(0.0, 0.05 / n, (n, 3))
-        pulls[1:-1] += (shift - shift.mean(axis=0)).ravel()
+        shift = rng.normal(0.0, DRAWN / n, (n, 3))
+        way = np.sin(np.linspace(0.0, np.pi, len(places)))
+        pulls += way[:, None] * (shift - shift.mean(axis=0)).ravel()
     attempt.obstacles = guess.one_sided(places, scene.obstacles)
     guess.yield_to(
         places, pulls, scene.lengths, attempt.obstacles, limits.reach + 0.01, 2.05 * limits.reach,
         limits.slack + 0.1, 0.02, 40,
     )  # fmt: skip
     far = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-    attempt.begin(places, pulls, grid, (2.3, 2.8, 2.0)[k % 3] * np.sqrt(max(far, 0.3)))
+    far = max(far, 0.3)
+    attempt.begin(places, pulls, grid, (2.3, 2.8, 2.0)[k % 3] * np.sqrt(far))
+    if k % 2:
+        attempt.short = SHORT * limits.least_time(far)
 
 
-def _settle(
-    attempt: Attempt, fine: Grid, margins: Numbers, shorter: float
-) -> tuple[Found | None, Numbers]:
-    """Optimise and certify, again from what was certified as long as that gets shorter; None where it fails or takes ``shorter``."""
+def _settle(attempt: Attempt, fine: Grid, margins: Numbers, shorter: float) -> Iterator[Judged]:
+    """Optimise and certify: where nothing is known yet a slow plan, then ever shorter ones until that fails or gains nothing."""
+    attempt.improve(*SLOWLY, margins)
+    if np.isinf(shorter):
+        slow = attempt.T.copy()
+        found, worst = _certified(attempt, margins, shorter)
+        if found is not None:
+            yield found, worst
+            shorter = found[2]
+        attempt.T = slow
+    attempt.T[0] = min(attempt.T[0], attempt.short)
     for hurry, most in COARSELY:
         attempt.improve(hurry, most, margins)
     attempt.refine(fine)
-    best: Found | None = None
-    kept = np.full(len(KINDS), np.inf)
-    for _ in range(POLISHES):
-        for hurry, most in FINELY if best is None else AGAIN:
+    for polish in range(POLISHES):
+        for hurry, most in AGAIN if polish else FINELY:
             attempt.improve(hurry, most, margins)
         found, worst = _certified(attempt, margins, shorter)
-        if best is None:
-            kept = worst
-        if found is None:
-            break
-        gained = best is None or found[2] < 0.997 * best[2]
-        if best is None or found[2] < best[2]:
-            best, kept, shorter = found, worst, found[2]
-        if not gained:
-            break
-    return best, kept
+        yield found, worst
+        if found is None or (polish and found[2] > ENOUGH * shorter):
+            return
+        shorter = found[2]
 
 
-def _certified(attempt: Attempt, margins: Numbers, shorter: float) -> tuple[Found | None, Numbers]:
-    """Slow down until dense samples keep every limit; what the nearest was beyond them where that fails or gets as long as ``shorter``."""
+def _certified(attempt: Attempt, margins: Numbers, shorter: float) -> Judged:
+    """Slow down, further from the limits that were broken, until dense samples keep every one; fails before ``shorter``, s."""
     nearest = np.full(len(KINDS), np.inf)
     for _ in range(12):
         if attempt.T[0] >= shorter:
@@ -466,6 +506,7 @@ def _certified(attempt: Attempt, margins: Numbers, shorter: float) -> tuple[Foun
             return attempt.copy(), worst
         if worst.max() < nearest.max():
             nearest = worst
+        margins = margins + np.clip(worst[: len(margins)], 0.0, margins)
         attempt.T *= SLOWER
     return None, nearest
 

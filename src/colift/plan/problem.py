@@ -29,6 +29,8 @@ UNITS = (20.0, 10.0, 1.0, 10.0, 3.0)
 """Weights of a metre, of a weight of thrust, of a rad/s, of an equal share of pull, of a m/s."""
 ENOUGH = 1e-9
 """Cost that is none."""
+STALLED = 1e-5
+"""Share of the cost by which it has to fall in three iterations. Time makes most of it, and gets shorter by small steps along the limits."""
 NEVER = -1e9
 """Excess over a limit that nothing was held to."""
 KINDS = ("obstacle", "separation", "thrust", "rate", "tension", "speed")
@@ -454,7 +456,7 @@ def optimise(  # type: ignore[no-untyped-def]
         new = assemble(newx, newz, newT, 0, *problem)
         new += 0.5 * (hurry * newT) ** 2
         if new < cost:
-            stalls = stalls + 1 if cost - new < 1e-4 * cost else 0
+            stalls = stalls + 1 if cost - new < STALLED * cost else 0
             cx[:] = newx
             cz[:] = newz
             T[0] = newT
