@@ -262,7 +262,7 @@ PORTS: dict[str, Port] = {
             "observation",
             sees=(
                 *_named("estimated"), "estimated_ends", *_FELT, "thrusts", "standing",
-                "held_forces", "reeled", "lift_share", *_RECEIVED,
+                "held_forces", "reeled", "lift_share", "nominal_forces", *_RECEIVED,
             ),
         ),
         Port(

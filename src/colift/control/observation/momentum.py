@@ -52,8 +52,8 @@ PROMPT = 0.05
 STEADY = 0.1
 """Speed at which the ends of a taut cable may seem to part, m/s."""
 MIDDLE = 0.5
-"""Of a rigid load, whose thrusts are led by half a period so that they are right on average: there what has acted in a period is that of its middle. Of a
-point they are not, act as much later, and are observed as late: a correction of half of it would be a force on the load."""
+"""Of a rigid load, and where the cables are planned: there thrusts are led by half a period so that they are right on average, and what has acted in a period
+is that of its middle. Of another point they are not, act as much later, and are observed as late: a correction of half of it would be a force on the load."""
 FIRST = 0.05
 """Time over which a length is known by before it is used, s."""
 
@@ -152,6 +152,7 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     ends = sees.estimated_ends
     T, forces, wind = sees.received_tensions, writes.estimated_forces, writes.estimated_wind
     n = x.shape[0]
+    middle = params[P.middle] if math.isnan(sees.nominal_forces[0, 0, 0]) else MIDDLE
     g, m_L = params[P.g], params[P.m_L]
     total, own, delay = params[P.total], params[P.own], params[P.delay]
     lag = decay(dt, params[P.lag])
@@ -180,7 +181,7 @@ def _observe(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
                 memory[o + M.own + k] = m * v[i, k]
                 memory[M.momentum + k] += m * v[i, k]
         else:
-            before, middle = memory[o + M.thrust], params[P.middle]
+            before = memory[o + M.thrust]
             thrust = lag * before + (1.0 - lag) * thrusts[i]
             memory[o + M.thrust] = thrust
             thrust += middle * (before - thrust)

@@ -108,31 +108,43 @@ def _command(i, hx, hy, hz, dx, dy, dz, attitudes, rates):  # type: ignore[no-un
         rates[i, 2] = 2.0 * oz
 
 
-AHEAD = 9
+AHEAD = 15
 """Numbers that :func:`look_ahead` remembers of a drone."""
 
 
 @inline
-def look_ahead(i, fresh, dt, keep, lag, p, memory, o, attitudes, turning):  # type: ignore[no-untyped-def]
+def look_ahead(i, fresh, dt, keep, lag, p, memory, o, attitudes, rates, turning):  # type: ignore[no-untyped-def]
     """What the thrust vector ``p`` (3,) that is planned of drone i, free of any feedback, will be while a command acts.
 
     By half a period and ``lag`` the size of the thrust is led, which is returned: it is held for a period. Its direction is not, for attitudes follow the wanted rate in
-    between. Its angular acceleration, body frame, is put into ``turning[i]``. ``memory[o : o + 9]`` holds the last planned vector, its rate and filtered second
-    derivative.
+    between. Its angular acceleration, body frame, is put into ``turning[i]``: with ``p = s b``, ``b'' = (p'' - s'' b - 2 s' b') / s`` and, about the
+    body's axis ``b``, ``b'' = alpha x b + omega x (omega x b)``. ``memory[o : o + 15]`` holds the last planned vector, its last differences, the second of them filtered, and
+    both derivatives as they will be.
     """
     q = attitudes[i]
     size = math.sqrt(max(p[0] * p[0] + p[1] * p[1] + p[2] * p[2], 1e-12))
-    more = 0.0
+    half, late = 0.5 * dt, 1.5 + keep / (1.0 - keep)
+    stretch = 0.0
     for k in range(3):
         rate = 0.0 if fresh else (p[k] - memory[o + k]) / dt
         bend = 0.0 if fresh else (rate - memory[o + 3 + k]) / dt
+        change = (1.0 - keep) * (bend - memory[o + 6 + k])
         memory[o + k], memory[o + 3 + k] = p[k], rate
-        memory[o + 6 + k] = keep * memory[o + 6 + k] + (1.0 - keep) * bend
+        memory[o + 6 + k] += change
         # A difference is that of the middle of the last period.
-        rate += 0.5 * dt * memory[o + 6 + k]
-        more += (lag + 0.5 * dt) * rate * p[k] / size
+        memory[o + 9 + k] = rate + half * memory[o + 6 + k]
+        # The second is a period old, more by the filter, and held for a period.
+        memory[o + 12 + k] = memory[o + 6 + k] + late * change
+        stretch += memory[o + 9 + k] * p[k] / size
+    bx, by, _ = quaternion.into_body(
+        q[0], q[1], q[2], q[3],
+        memory[o + 9] - stretch * p[0] / size, memory[o + 10] - stretch * p[1] / size, memory[o + 11] - stretch * p[2] / size,
+    )  # fmt: skip
     x, y, _ = quaternion.into_body(
-        q[0], q[1], q[2], q[3], memory[o + 6], memory[o + 7], memory[o + 8]
+        q[0], q[1], q[2], q[3], memory[o + 12], memory[o + 13], memory[o + 14]
     )
-    turning[i, 0], turning[i, 1], turning[i, 2] = -y / size, x / size, 0.0
-    return more
+    twice = 2.0 * stretch / size
+    turning[i, 0] = (twice * by - y + rates[i, 2] * bx) / size
+    turning[i, 1] = (x - twice * bx + rates[i, 2] * by) / size
+    turning[i, 2] = 0.0
+    return (lag + half) * stretch

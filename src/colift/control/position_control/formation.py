@@ -39,13 +39,13 @@ PARAMS = Layout(
 )  # fmt: skip
 """``band``: bandwidth of the velocity loop, 1/s; thrusts ``least`` and ``most``, N; ``total``: mass of all drones."""
 MEMORY = Layout(
-    team={"planned": 3, "plan": 3},
+    team={"planned": 3},
     drone={
         "started": 1, "direction": CABLE, "aim": AIM_ALONG, "ahead": AHEAD, "jerk": 3, "snap": 3, "change": 9,
         "told": 1, "beside": 1, "tension": 1,
     },
 )  # fmt: skip
-"""``planned``: thrust vector as far as it is free of noise, ``plan`` as far as it is free of any feedback; ``change``: pull that the load's motion asks for, two derivatives;
+"""``planned``: thrust vector as far as it is free of noise, where the cables are planned of any feedback; ``change``: pull that the load's motion asks for, two derivatives;
 of a rigid load the ``tension`` as it is now, by what was ``told`` last ``beside`` the plan."""
 P, M = PARAMS.at, MEMORY.at
 
@@ -130,7 +130,6 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         if math.isnan(nominal[0, 0, 0]):
             nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
     follows = params[P.rigid] > 0.0 or not math.isnan(nominal[0, 0, 0])  # the cables are planned
-    planned_now = memory[M.plan : M.plan + 3]
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
@@ -203,7 +202,6 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             planned[k] = needed - tension * memory[a]
             known = tension * pull + forces[i, k] + m / params[P.total] * short[k]
             u[i, k] = needed + m * most * u[i, k] - known
-        more = 0.0
         for k in range(3):
             writes.desired_turning[i, k] = 0.0
         wind = sees.estimated_wind
@@ -215,12 +213,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
                 u[i, k] = planned[k] = 0.0 if k < 2 else IDLE * m * g
         else:
             if follows and not led:
-                nominal_thrust(i, m, g, span, wanted, nominal, planned_now)
-                more = look_ahead(
-                    i, memory[o + M.started] == 0.0, dt, keep_plan, params[P.lag], planned_now, memory,
-                    o + M.ahead, sees.estimated_attitudes, writes.desired_turning,
-                )  # fmt: skip
-                planned[0], planned[1], planned[2] = planned_now
+                nominal_thrust(i, m, g, span, wanted, nominal, planned)
             limit(i, u, params[p + P.least], params[p + P.most], params[P.tangent])
         norm = math.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         fresh = memory[o + M.started] == 0.0
@@ -228,7 +221,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         aim_along(
             i, fresh, dt, keep, planned, u, norm, memory, o + M.aim, thrusts, attitudes, rates
         )
-        thrusts[i] += more
+        if follows and not led and sees.standing[i] == 0.0:
+            thrusts[i] += look_ahead(
+                i, fresh, dt, keep_plan, params[P.lag], planned, memory, o + M.ahead, sees.estimated_attitudes, rates,
+                writes.desired_turning,
+            )  # fmt: skip
+            for k in range(3):  # a difference is that of the middle of the last period
+                rates[i, k] += 0.5 * dt * writes.desired_turning[i, k]
 
 
 class Formation(PositionControlPart, Delays):
