@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 
 import colift
 from colift.record.assumptions import ASSUMPTIONS, Monitor
 from colift.study.certify import certificate
+from colift.study.certify.kept import file_beside
 from colift.study.certify.space import Space
 from terminal import colift as run
 
@@ -116,6 +121,79 @@ def test_splitting_says_what_it_can_say(tmp_path):
     assert certificate.check(certificate.read(file)) == []
 
 
+# ---------------------------------------------------------------- Ctrl-C
+
+
+class Interrupting:
+    """Told of each trial; Ctrl-C at one of them."""
+
+    def __init__(self, at):
+        self.at, self.done = at, 0
+
+    def __call__(self, done, failed):
+        self.done = done
+        if done == self.at:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("method", ["direct", "splitting"])
+def test_an_interrupted_certificate_goes_on_from_the_flights_that_are_done(method, tmp_path):
+    space = Space.of("hover", {"timing.duration": 0.2, "criteria.tracking_max_m.max": 0.1})
+    settings = {"method": method, "particles": 2, "block": 0.1}
+    ask = certificate.Question(bound=0.2, most=20 if method == "direct" else 6, **settings)
+    part = file_beside(tmp_path / "c.json")
+    with pytest.raises(KeyboardInterrupt):
+        certificate.certify(space, ask, workers=1, told=Interrupting(3), part=part)
+    head, first, *rows = part.read_text().splitlines()
+    assert len(rows) >= 2
+    # The first one is told otherwise, the last one is cut off: who goes on believes the one, and flies the other again.
+    first = json.loads(first)
+    first[-1]["tension_N"] = 123.0
+    part.write_text("\n".join([head, json.dumps(first), *rows])[:-5])
+    again = certificate.certify(space, ask, workers=1, part=part)
+    assert not part.exists()
+    whole = certificate.certify(space, ask, workers=1)
+    assert again["worst"].pop("tension_N") == 123.0 > whole["worst"].pop("tension_N")
+    assert again == whole
+
+
+def test_ctrl_c_says_how_to_go_on(tmp_path):
+    """Only the same flights are gone on with; two processes do not write into one file."""
+    file = tmp_path / "c.json"
+    command = (
+        "certify",
+        "hover",
+        "--set",
+        "timing.duration=0.2",
+        "--workers",
+        "1",
+        "--out",
+        str(file),
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-m", "colift", *command, "--bound", "0.0001"], stderr=subprocess.PIPE, text=True
+    )  # fmt: skip
+    part = file_beside(file)
+    while not part.exists() or part.read_text().count("\n") < 3:
+        assert process.poll() is None
+        time.sleep(0.05)
+    other = run(*command)
+    assert other.returncode == 1
+    assert "another process is at this certificate" in other.stderr
+    process.send_signal(signal.SIGINT)
+    assert "the same command goes on from there" in process.communicate()[1]
+    assert process.returncode == 130
+    assert not file.exists()
+    other = run(*command, "--set", "load.mass=0.2")
+    assert other.returncode == 1
+    assert "holds trials of another certificate (other digest)" in other.stderr
+    done = run(*command, "--bound", "0.5")
+    assert done.returncode == 0
+    assert "goes on with the flights in" in done.stderr
+    assert not part.exists()
+    assert run("certify", "--check", str(file)).returncode == 0
+
+
 @pytest.mark.parametrize(
     ("options", "told"),
     [
@@ -135,7 +213,7 @@ def test_what_cannot_be_certified_is_refused_by_name(options, told, tmp_path):
     done = run("certify", "hover", *SHORT, *options, "--out", str(file))
     assert done.returncode in (1, 2)
     assert told in done.stderr
-    assert not file.exists()
+    assert list(tmp_path.iterdir()) == []
 
 
 # ---------------------------------------------------------------- the monitor

@@ -99,7 +99,7 @@ def certify(
     """Fly a mission with seed after seed until fewer than a share of its flights are known to fail.
 
     The test may be looked at after every flight, so it stops as soon as it knows. Failed is a flight that misses a
-    criterion, or loses load or team. Exit code 4 where the bound is not certified, or a check comes out otherwise.
+    criterion, or loses load or team. After Ctrl-C the same command goes on with the flights that are done. Exit code 4 where the bound is not certified, or a check comes out otherwise.
 
     [bold]Examples[/bold]
 
@@ -125,6 +125,7 @@ def certify(
 
     with loading():
         from colift.study.certify import certificate
+        from colift.study.certify.kept import file_beside
         from colift.study.certify.space import Space
 
         space = Space.of(mission, parse_overrides(sets), _ranges(vary))
@@ -132,8 +133,11 @@ def certify(
             bound=bound, confidence=confidence, first_seed=first_seed, most=seeds or (20 if splitting else 2000),
             limits=_limits(assume), method="splitting" if splitting else "direct", particles=particles, block=block,
         )  # fmt: skip
-    with _bar("Certifying", question.most, splitting) as told:
-        found = certificate.certify(space, question, sources=sources, workers=workers, told=told)
+    part = file_beside(target)
+    with _bar("Certifying", question.most, splitting, part) as told:
+        found = certificate.certify(
+            space, question, sources=sources, workers=workers, told=told, part=part
+        )
     certificate.save(found, target)
     if as_json:
         emit({**found, "file": target})
@@ -168,8 +172,12 @@ def _limits(given: list[str] | None) -> dict[str, float]:
 
 
 @contextmanager
-def _bar(title: str, most: int, splitting: bool) -> Iterator[Callable[[int, int], None]]:
-    """A bar of flights on a terminal; after Ctrl-C nothing is written."""
+def _bar(
+    title: str, most: int, splitting: bool, part: Path | None = None
+) -> Iterator[Callable[[int, int], None]]:
+    """A bar of flights on a terminal; after Ctrl-C it is said where those are that were done."""
+    if part is not None and part.exists():
+        err.print(f"goes on with the flights in {part}", markup=False, soft_wrap=True)
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
@@ -186,7 +194,10 @@ def _bar(title: str, most: int, splitting: bool) -> Iterator[Callable[[int, int]
             yield told
         except KeyboardInterrupt:
             bar.stop()
-            err.print("interrupted: nothing was written", highlight=False)
+            said = "nothing was written"
+            if part is not None and part.exists():
+                said = f"flights that are done are in {part}; the same command goes on from there"
+            err.print(f"interrupted: {said}", markup=False, highlight=False, soft_wrap=True)
             raise typer.Exit(EXIT_INTERRUPTED) from None
 
 

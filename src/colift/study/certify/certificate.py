@@ -16,6 +16,7 @@ from colift.record.assumptions import largest
 from colift.record.recording import atomic_path, versions
 from colift.study.campaign.plan import Source, code_digest
 from colift.study.certify import trials
+from colift.study.certify.kept import Kept, keeping
 from colift.study.certify.space import Space
 
 FORMAT = "colift certificate 1"
@@ -92,21 +93,39 @@ def certify(
     sources: Sequence[Source] = (),
     workers: int | None = None,
     told: trials.Told = lambda _done, _failed: None,
+    part: Path | None = None,
 ) -> dict[str, Any]:
     """Fly, and hand back the certificate.
+
+    Parameters
+    ----------
+    space, question, sources, workers
+        What is flown, what is asked, files of parts, and how many flights at a time.
+    told
+        Called after each trial.
+    part
+        File that keeps trials until all are done; one that is there is gone on from, whatever the bound and the range of seeds were then.
 
     Raises
     ------
     ColiftError
-        If a flight ends in an error.
+        If a flight ends in an error, or the file is of something else.
 
     """
-    ask = _direct if question.method == "direct" else _splitting
-    answer = ask(space, question, sources, workers, told)
-    return {
-        "format": FORMAT, "statement": statement(space, question, answer), "question": asdict(question), **answer,
+    direct = question.method == "direct"
+    ask, make = (_direct, trials.Trial) if direct else (_splitting, trials.Replica)
+    common = {
         "vary": {path: list(ends) for path, ends in space.vary.items()}, "digest": space.digest, "code": code_digest(),
-        "parts": {source.name: _digest(source) for source in sources}, "versions": versions(), "mission": space.mission,
+        "parts": {source.name: _digest(source) for source in sources}, "versions": versions(),
+    }  # fmt: skip
+    asked = asdict(question)
+    same = ("limits", "method") if direct else ("limits", "method", "particles", "block")
+    about = {"format": f"{FORMAT}, trials", **{name: asked[name] for name in same}, **common}
+    with keeping(part, about, make) as kept:
+        answer = ask(space, question, sources, workers, told, kept)
+    return {
+        "format": FORMAT, "statement": statement(space, question, answer), "question": asked, **answer, **common,
+        "mission": space.mission,
     }  # fmt: skip
 
 
@@ -125,12 +144,14 @@ def verdict(failures: int, flights: int, bound: float, confidence: float) -> str
 
 
 def _direct(
-    space: Space, question: Question, sources: Sequence[Source], workers: int | None, told: trials.Told
+    space: Space, question: Question, sources: Sequence[Source], workers: int | None, told: trials.Told, kept: Kept[Any]
 ) -> dict[str, Any]:  # fmt: skip
     failed: list[dict[str, Any]] = []
     worst: dict[str, float] = {}
     flights, result = 0, OPEN
-    flown = trials.fly(space, question.seeds, question.limits, sources=sources, workers=workers)
+    flown = trials.fly(
+        space, question.seeds, question.limits, sources=sources, workers=workers, kept=kept
+    )
     for flights, trial in enumerate(flown, 1):
         worst = largest(worst, trial.worst)
         if trial.reason:
@@ -147,12 +168,12 @@ def _direct(
 
 
 def _splitting(
-    space: Space, question: Question, sources: Sequence[Source], workers: int | None, told: trials.Told
+    space: Space, question: Question, sources: Sequence[Source], workers: int | None, told: trials.Told, kept: Kept[Any]
 ) -> dict[str, Any]:  # fmt: skip
     found: list[trials.Replica] = []
     made = trials.split(
         space, question.seeds, question.limits, particles=question.particles, block=question.block, sources=sources,
-        workers=workers,
+        workers=workers, kept=kept,
     )  # fmt: skip
     for replica in made:
         found.append(replica)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, MutableMapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -53,8 +53,9 @@ def fly(
     *,
     sources: Sequence[Source] = (),
     workers: int | None = None,
+    kept: MutableMapping[int, Trial] | None = None,
 ) -> Generator[Trial]:
-    """Fly seeds one after the other, several at a time; who goes beyond a limit fails as well.
+    """Fly seeds one after the other, several at a time, but for those that are ``kept``; who goes beyond a limit fails as well.
 
     Raises
     ------
@@ -63,13 +64,19 @@ def fly(
 
     """
     Monitor(limits)  # names are checked before anything is flown
+    kept = {} if kept is None else kept
     with LocalPool(workers, watched) as pool:
         for first in range(0, len(seeds), BATCH):
             batch = seeds[first : first + BATCH]
-            jobs = [_job(space.mission_of(seed).resolved(), f"{seed}", sources) for seed in batch]
-            found = {result.key: result for result in pool.fly(jobs)}
+            jobs = [
+                _job(space.mission_of(seed).resolved(), f"{seed}", sources)
+                for seed in batch
+                if seed not in kept
+            ]
+            for result in map(_sound, pool.fly(jobs)):
+                kept[int(result.key)] = _trial(int(result.key), result, limits)
             for seed in batch:
-                yield _trial(seed, _sound(found[f"{seed}"]), limits)
+                yield kept[seed]
 
 
 def _job(mission: dict[str, Any], key: str, sources: Sequence[Source]) -> Job:
@@ -123,8 +130,9 @@ def split(
     block: float,
     sources: Sequence[Source] = (),
     workers: int | None = None,
+    kept: MutableMapping[int, Replica] | None = None,
 ) -> Iterator[Replica]:
-    """Estimates by splitting, as they come.
+    """Estimates by splitting: those that are ``kept``, then the others as they come.
 
     Raises
     ------
@@ -136,10 +144,14 @@ def split(
     if not bounds_of(space.mission_of(1)) and not limits:
         raise ColiftError("splitting: the mission has no criterion of a least or largest value")
     task = partial(_attempt_split, space, dict(limits), particles, block)
-    jobs = [_job(space.mission, f"{seed}", sources) for seed in seeds]
+    kept = {} if kept is None else kept
+    yield from [kept[seed] for seed in seeds if seed in kept]
+    jobs = [_job(space.mission, f"{seed}", sources) for seed in seeds if seed not in kept]
     with LocalPool(workers, task) as pool:
         for result in map(_sound, pool.fly(jobs)):
-            yield Replica(int(result.key), **result.found)
+            replica = Replica(int(result.key), **result.found)
+            kept[replica.seed] = replica
+            yield replica
 
 
 def _attempt_split(
