@@ -10,7 +10,7 @@ import pytest
 from colift.mission import load_mission
 from colift.study.certify import splitting
 from colift.study.certify.space import Space
-from colift.study.certify.trials import Flights, mean_of_blocks
+from colift.study.certify.trials import PILOTS, Flights, mean_of_blocks
 
 
 class Walk:
@@ -116,6 +116,24 @@ def test_flights_that_share_their_past_go_on_as_they_would_alone():
     assert level == level_again
     np.testing.assert_array_equal(one.at.state[0], alone.at.state[0])
     assert not np.array_equal(one.at.state[0], other.at.state[0])
+
+
+def test_a_level_is_counted_from_what_is_usual():
+    """Or a formation that is always near its least angle, and never below, would be all that splitting looks at."""
+    space = Space.of("hover", {**GUSTY, "criteria.min_angle_deg.min": 37.0})
+    system, other = Flights(space, 0.5, {"wind_mps": 40.0}), Flights(space, 0.5, {"wind_mps": 40.0})
+    _, before = system.advance(system.begin(3), 7)
+    assert system.learn(5) == other.learn(5) == PILOTS * system.blocks
+    assert system.usual == other.usual
+    assert system.usual.keys() >= {"-min_angle_deg", "tracking_max_m", "wind_mps"}
+    assert system.usual["-min_angle_deg"] < -37.0
+    _, level = system.advance(system.begin(3), 7)
+    assert before > 0.85  # by the share of its limit, though no formation ever comes nearer
+    assert level < before
+    for key, limit in (("tracking_max_m", 0.05), ("-min_angle_deg", -37.0)):
+        assert system._level(key, system.usual[key], limit) == pytest.approx(0.0, abs=1e-12)
+        assert system._level(key, limit, limit) == 1.0
+    assert system._level("tracking_max_m", 0.02, 1e-6) > 1.0  # a limit that is usually missed
 
 
 def test_random_numbers_come_back_with_a_snapshot():

@@ -164,32 +164,56 @@ def _split(
     space: Space, limits: Mapping[str, float], particles: int, block: float, job: Job
 ) -> Result:
     system = Flights(space, block, limits)
+    before = system.learn(int(job.key))
     found = splitting.estimate(system, particles, int(job.key))
-    return Result(job.key, found={**found._asdict(), "worst": system.worst})
+    own = {**found._asdict(), "blocks": before + found.blocks, "worst": system.worst}
+    return Result(job.key, found=own)
 
 
 class State(NamedTuple):
-    """A flight at a moment, and the largest of each quantity until then."""
+    """A flight at a moment, the largest of each quantity until then, and what the last block showed of criteria and assumptions."""
 
     flight: Flight
     at: Snapshot
     worst: dict[str, float]
+    shown: list[tuple[str, float, float]]
+
+
+PILOTS, PILOT = 4, 1
+"""Flights that show what is usual, before any is split; and beside the seed, of their random numbers."""
 
 
 class Flights:
     """Flights of a space that go on in blocks (:class:`~colift.study.certify.splitting.System`); random numbers are drawn anew for each block.
 
-    The level is 1 where a criterion is just missed, or an assumption: a value over its most, ``2 - value / least``.
+    The level is that of the criterion, or assumption, which is nearest to being missed: 1 where it just is, 0 where it is as
+    usual. Otherwise one that is always near, and never missed, would be all that is looked at.
     """
 
     def __init__(self, space: Space, block: float, limits: Mapping[str, float]) -> None:
         self.space, self.block, self.limits = space, block, limits
         self.blocks = max(1, math.ceil(space.mission["timing"]["duration"] / block - 1e-9))
         self.worst: dict[str, float] = {}
+        self.usual: dict[str, float] = {}
+
+    def learn(self, seed: int) -> int:
+        """Find out what is usual, by flights of their own, so that it depends on none that is split; how many blocks it took."""
+        random, seen, flown = np.random.default_rng([seed, PILOT]), dict[str, list[float]](), 0
+        for _ in range(PILOTS):
+            state, level = self.begin(int(random.integers(2**63))), -math.inf
+            for _ in range(self.blocks):
+                if level == math.inf:
+                    break
+                state, level = self.advance(state, int(random.integers(2**63)))
+                flown += 1
+                for key, value, _ in state.shown:
+                    seen.setdefault(key, []).append(value)
+        self.usual = {key: float(np.mean(values)) for key, values in seen.items()}
+        return flown
 
     def begin(self, seed: int) -> State:
         flight = Flight(self.space.mission_of(seed))
-        return State(flight, flight.snapshot(), {})
+        return State(flight, flight.snapshot(), {}, [])
 
     def advance(self, state: State, seed: int) -> tuple[State, float]:
         flight = state.flight
@@ -202,14 +226,18 @@ class Flights:
         stretch, monitor = flight.recording(since), Monitor()
         monitor.look(stretch)
         self.worst = largest(self.worst, monitor.worst)
-        worst = largest(state.worst, monitor.worst)
-        level = max(
-            severity(stretch, bounds_of(flight.mission)),
-            *(worst.get(name, math.inf) / limit for name, limit in self.limits.items()),
-            -math.inf,
-        )
+        shown = [
+            *shown_by(stretch, bounds_of(flight.mission)),
+            *((k, monitor.worst.get(k, math.inf), v) for k, v in self.limits.items()),
+        ]
+        level = max((self._level(*each) for each in shown), default=-math.inf)
         over = flight.outcome != "completed"
-        return State(flight, flight.snapshot(), worst), math.inf if over else level
+        after = State(flight, flight.snapshot(), largest(state.worst, monitor.worst), shown)
+        return after, math.inf if over else level
+
+    def _level(self, key: str, value: float, limit: float) -> float:
+        room = limit - self.usual.get(key, math.inf)
+        return 1.0 + (value - limit) / (room if room > 0.0 else abs(limit) or 1.0)
 
     def failed(self, state: State) -> bool:
         state.flight.restore(state.at)
@@ -242,12 +270,10 @@ def bounds_of(mission: Described) -> dict[str, Bound]:
     }
 
 
-def severity(stretch: Recording, bounds: Mapping[str, Bound]) -> float:
-    """How near a stretch of a flight came to missing a criterion: 1 where it just does, more beyond."""
-    found = -math.inf
+def shown_by(stretch: Recording, bounds: Mapping[str, Bound]) -> Iterator[tuple[str, float, float]]:
+    """What a stretch of a flight shows of each criterion, and from where on that is missed; what must not be too little with its sign turned."""
     for name, bound in bounds.items():
         value = metrics.value_of(name, stretch)
-        for limit, sign in ((bound.max, 1.0), (bound.min, -1.0)):
+        for limit, sign, key in ((bound.max, 1.0, name), (bound.min, -1.0, f"-{name}")):
             if limit is not None and math.isfinite(value):
-                found = max(found, 1.0 + sign * (value - limit) / (abs(limit) or 1.0))
-    return found
+                yield key, sign * value, sign * limit
