@@ -1,6 +1,6 @@
-"""Fly a mission with each compiled kernel of the controllers also called as C, on copies: python beside.py MISSION SECONDS.
+"""Fly a mission with each compiled kernel of the controllers also called as C, on copies: python beside.py SECONDS MISSION ...
 
-Prints, by kernel, how often it was called and how often C did anything else. Needs NUMBA_CPU_NAME=generic.
+Prints, by mission and kernel, how often it was called and how often C did anything else. Needs NUMBA_CPU_NAME=generic.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,25 +70,26 @@ def same(a: Any, b: Any) -> bool:
     return bool(np.all(equal | (np.isnan(a) & np.isnan(b))))
 
 
-def main() -> None:
-    """Fly."""
+def flown(name: str, seconds: float, compiled: Callable[[Any], Compiled]) -> dict[str, list[int]]:
+    """Of each kernel the calls along a mission's flight, and how many were otherwise in C."""
     calls: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     flight: Any = None
 
-    def beside(part: Any, compiled: Compiled) -> Any:
-        inner, name = type(part).kernel, compiled.kernel.name
+    def beside(part: Any) -> Any:
+        inner, code = type(part).kernel, compiled(type(part))
+        kind = code.kernel.name
 
         def kernel(now, sees, params, memory, writes):
             kept, told = memory.copy(), type(writes)(*(each.copy() for each in writes))
             n = len(flight.drones)
-            status = compiled(n, now, sees, params, kept, told)
+            status = code(n, now, sees, params, kept, told)
             answer = inner(now, sees, params, memory, writes)
-            calls[name] += 1
+            calls[kind] += 1
             agree = same(memory, kept) and all(
                 same(a, b) for a, b in zip(writes, told, strict=True)
             )
-            wrong[name] += not agree or (answer is not None and answer != status)
+            wrong[kind] += not agree or (answer is not None and answer != status)
             return answer
 
         like = {"__module__": type(part).__module__, "kernel": staticmethod(kernel)}
@@ -94,18 +97,22 @@ def main() -> None:
         values = {field: getattr(part, field) for field in type(part).model_fields}
         return made.model_construct(_fields_set=part.model_fields_set, **values)
 
+    mission = colift.load_mission(name)
+    changes = {layer: beside(getattr(mission, layer)) for layer in LAYERS}
+    flight = Flight(mission)
+    for layer, part in changes.items():
+        flight._parts[layer] = part
+    flight.regroup(flight.drones)
+    flight.advance(seconds)
+    return {kind: [calls[kind], wrong[kind]] for kind in calls}
+
+
+def main() -> None:
+    """Fly."""
     with tempfile.TemporaryDirectory() as folder:
-        mission = colift.load_mission(sys.argv[1])
-        parts = {layer: getattr(mission, layer) for layer in LAYERS}
-        changes = {
-            layer: beside(part, Compiled(type(part), Path(folder))) for layer, part in parts.items()
-        }
-        flight = Flight(mission)
-        for layer, part in changes.items():
-            flight._parts[layer] = part
-        flight.regroup(flight.drones)
-        flight.advance(float(sys.argv[2]))
-    print(json.dumps({name: [calls[name], wrong[name]] for name in calls}))
+        compiled = cache(lambda part: Compiled(part, Path(folder)))
+        seconds, names = float(sys.argv[1]), sys.argv[2:]
+        print(json.dumps({name: flown(name, seconds, compiled) for name in names}))
 
 
 if __name__ == "__main__":

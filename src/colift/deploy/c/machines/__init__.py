@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -125,6 +126,21 @@ class Answers(NamedTuple):
     stack: int
 
 
+def _run(command: Sequence[str], folder: Path) -> str:
+    return subprocess.run(command, cwd=folder, check=True, text=True, stdout=subprocess.PIPE).stdout
+
+
+@cache
+def _compiled(text: str, header: str, command: tuple[str, ...]) -> bytes:
+    """A kernel as a compiler makes it, once for all teams of a process."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "colift.h").write_text(header)
+        (folder / "kernel.c").write_text(text)
+        _run([*command, "-c", "kernel.c", "-o", "kernel.o"], folder)
+        return (folder / "kernel.o").read_bytes()
+
+
 class Driver:
     """A kernel of an allocator, compiled for a machine together with what calls it; it has a folder, until it is closed.
 
@@ -140,22 +156,17 @@ class Driver:
     ) -> None:
         self.machine, self._stack = MACHINES[machine], ExitStack()
         self.folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-        (self.folder / "colift.h").write_text(header_of([kernel]))
-        (self.folder / "kernel.c").write_text(kernel.file("colift.h"))
+        command = (*self.machine.compiler, *flags)
+        header = header_of([kernel])
+        (self.folder / "colift.h").write_text(header)
+        (self.folder / "kernel.o").write_bytes(_compiled(kernel.file("colift.h"), header, command))
         drones, params, memory = most
-        sizes = [f"-DDRONES={drones}", f"-DPARAMS={params}", f"-DMEMORY={memory}"]
         made = [
-            f"-DKERNEL={kernel.name}",
-            f"-DREAL={kernel.program.real}",
-            *sizes,
-            f"-I{HERE}",
-            "-I.",
-        ]
-        sources = ["kernel.c", str(HERE / "driver.c"), str(HERE / self.machine.source)]
-        self._run(
-            [*self.machine.compiler, *flags, *made, *sources, *self.machine.link, "-o", "driver"]
-        )
-        self._flags = [*flags, *made]
+            f"-DKERNEL={kernel.name}", f"-DREAL={kernel.program.real}", f"-DDRONES={drones}", f"-DPARAMS={params}", f"-DMEMORY={memory}",
+            f"-I{HERE}", "-I.",
+        ]  # fmt: skip
+        sources = ["kernel.o", str(HERE / "driver.c"), str(HERE / self.machine.source)]
+        _run([*command, *made, *sources, *self.machine.link, "-o", "driver"], self.folder)
 
     def __enter__(self) -> Driver:
         return self
@@ -167,16 +178,11 @@ class Driver:
         """Remove its files."""
         self._stack.close()
 
-    def _run(self, command: Sequence[str]) -> str:
-        done = subprocess.run(
-            command, cwd=self.folder, check=True, text=True, stdout=subprocess.PIPE
-        )
-        return done.stdout
-
     def __call__(self, calls: Calls) -> Answers:
         """The answers to these calls."""
         (self.folder / "calls.bin").write_bytes(calls.packed())
-        self._run([*self.machine.runner, "driver" if self.machine.runner else "./driver"])
+        runner = self.machine.runner
+        _run([*runner, "driver"] if runner else ["./driver"], self.folder)
         raw, n = (self.folder / "answers.bin").read_bytes(), len(calls.directions)
         rows = np.frombuffer(raw[:-4], "<f8").reshape(len(calls.forces), 9 + 4 * n)
         return Answers(
@@ -186,5 +192,4 @@ class Driver:
 
     def code(self) -> int:
         """Bytes of code and constants of the kernel, without the C library's."""
-        self._run([*self.machine.compiler, *self._flags, "-c", "kernel.c", "-o", "kernel.o"])
-        return int(self._run([self.machine.size, "kernel.o"]).splitlines()[1].split()[0])
+        return int(_run([self.machine.size, "kernel.o"], self.folder).splitlines()[1].split()[0])
