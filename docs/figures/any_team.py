@@ -3,7 +3,7 @@
 python docs/figures/any_team.py [--fly]
 
 From ``any_team.json`` beside this file, which ``--fly`` makes first with ``benchmarks/any_team.py``: what is refused is flown as
-well, so that false alarms are counted. No tuning of the controllers saw these seeds; the bound of the lean was loosened after them.
+well, so that false alarms are counted. No tuning saw these seeds, but the bound of the thrust was loosened after two of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pages import benchmark, fill, stored, table
 
 from colift.kernel.math import shares
 
-FIRST, MISSIONS = 67_000, 400
+FIRST, MISSIONS = 72_000, 400
 TEAMS = {"one drone": (1,), "two": (2,), "three to eight": tuple(range(3, 9))}
 
 
@@ -49,9 +49,10 @@ def main() -> None:
             [
                 name, str(len(those)), shares.text(sum(map(bool, let)), len(let)),
                 str(count[True, False] + count[True, None]), str(count[True, True]),
+                shares.text(sum(map(bool, let)) + count[True, False] + count[True, None], len(those)),
             ]
         )  # fmt: skip
-    header = ["drones", "missions", "let fly, and fly well", "refused, would fail", "refused, would fly well"]  # fmt: skip
+    header = ["drones", "missions", "let fly, and fly well", "refused, would fail", "refused, would fly well", "flies well or is rightly refused"]  # fmt: skip
     fill("your-drones.md", "any-team", table(header, lines))
 
 
