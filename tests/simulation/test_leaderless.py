@@ -22,7 +22,7 @@ from colift.study import hostility
 SOURCES = Path(leaderless.__file__).parent
 FILES = ("_evidence", "_frame", "_message", "_pairs", "leaderless")
 MUTANTS = {
-    "adopts at once": ("_pairs", "good = keeps(memory, a, o + Q.r0, scratch, least)", "good = True"),
+    "adopts at once": ("_pairs", "good = keeps(memory, o, a, o + Q.r0, scratch, least)", "good = True"),
     "takes messages twice": ("leaderless", "if count <= memory[o + Q.count] or int", "if int"),
     "forgets what is acknowledged": (
         "_pairs", "    memory[o + Q.state] = OFFERED\n", "    memory[o + Q.state] = SETTLED\n    for k in range(3):\n        memory[o + Q.r0 + k] = memory[o + Q.r1 + k]\n",

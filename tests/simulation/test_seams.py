@@ -219,7 +219,8 @@ def test_what_nobody_drives_from_outside_is_refused():
     with pytest.raises(ColiftError, match='only a layer of kind "external"'):
         flight.act("allocation", desired_tensions=np.ones(4))
     with pytest.raises(
-        ColiftError, match="writes force, moment, learned_load, steady_force, not thrusts"
+        ColiftError,
+        match="writes force, moment, learned_load, steady_force, steady_moment, not thrusts",
     ):
         flight.act("load_control", thrusts=np.ones(4))
     with pytest.raises(SettingError, match="force"):

@@ -120,13 +120,13 @@ def compare(
         from colift.study.campaign.plan import Source, sift
 
         sources = [Source.read(path) for path in extra or []]
+        chosen = several(missions) or study.usual_missions(layer, quick=quick)
         able, missing = study.contestants(
-            several(wanted) or None, study.own_parts(sources, layer), layer
+            several(wanted) or None, study.own_parts(sources, layer), layer, chosen
         )
         changes = parse_overrides(sets)
         if quick:
             seeds, changes = 1, {"timing.duration": 4.0, **changes}
-        chosen = several(missions) or study.usual_missions(layer, quick=quick)
         flown_seeds = range(first_seed, first_seed + seeds)
         cases = study.cases(
             able, chosen, flown_seeds, changes, spread=spread, as_in_mission=as_in_mission, layer=layer

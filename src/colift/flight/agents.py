@@ -26,7 +26,8 @@ CENTRAL, TOLD, ALONE = 0, 1, 2
 SIGNALS = (
     "force", "steady_force", "reference", "load_views", "viewed_load", "viewed_forces", "wishes", "steady_wishes", "plans", "felt_forces", "clock_errors", "members", "inboxes", "heard", "carrying", "evidences", "desired_tensions",
     "desired_directions", "outboxes", "views", "estimated_load", "agreed_forces", "asking", "asked_forces", "team_tensions", "team_directions",
-    "agent_status", "received_tensions", "received_directions",
+    "agent_status", "received_tensions", "received_directions", "moment", "steady_moment", "wished_moments", "steady_moments",
+    "reference_attitude", "estimated_load_attitude", "formation",
 )  # fmt: skip
 """What a cycle takes and gives of the bus, beside what the network does."""
 
@@ -35,8 +36,9 @@ SIGNALS = (
 def rows_of(bus, i):  # type: ignore[no-untyped-def]
     """What drone i sees and what it writes."""
     sees = Sees(
-        bus.wishes[i], bus.steady_wishes[i], bus.plans[i], bus.members[i : i + 1], bus.members, bus.inboxes[i],
-        bus.heard[i], bus.evidences[i], bus.felt_forces[i], bus.estimated_load[1],
+        bus.wishes[i], bus.steady_wishes[i], bus.wished_moments[i], bus.steady_moments[i], bus.plans[i], bus.reference_attitude,
+        bus.estimated_load_attitude, bus.formation, bus.members[i : i + 1], bus.members, bus.inboxes[i], bus.heard[i],
+        bus.evidences[i], bus.felt_forces[i], bus.estimated_load[1],
     )  # fmt: skip
     writes = Writes(
         bus.desired_tensions[i : i + 1], bus.desired_directions[i], bus.outboxes[i], bus.views[i],
@@ -47,12 +49,14 @@ def rows_of(bus, i):  # type: ignore[no-untyped-def]
 
 @register_jitable
 def wish(control, bus, step, time, dt):  # type: ignore[no-untyped-def]
-    """Let each drone's load controller decide what it wants, from its own view of the load; the force of the bus is the mean."""
+    """Let each drone's load controller decide what it wants, from its own view of the load; force and moment of the bus are the means."""
     n, sees = bus.members.shape[0], control.sees
     width = control.memory.shape[0] // n
     for i in range(n):
         for k in range(3):
             bus.wishes[i, k], bus.steady_wishes[i, k] = bus.force[k], bus.steady_force[k]
+            bus.wished_moments[i, k] = bus.moment[k]
+            bus.steady_moments[i, k] = bus.steady_moment[k]
             bus.viewed_load[0, k] = sees.estimated_load[0, k] + bus.load_views[i, 0, k]
             bus.viewed_load[1, k] = sees.estimated_load[1, k]
             for m in range(n + 1):
@@ -66,18 +70,22 @@ def wish(control, bus, step, time, dt):  # type: ignore[no-untyped-def]
             bus.agreed_forces[i],
         )  # fmt: skip
         wishes = Wishes(
-            bus.wishes[i], control.writes.moment, control.writes.learned_load, bus.steady_wishes[i]
-        )
+            bus.wishes[i], bus.wished_moments[i], control.writes.learned_load, bus.steady_wishes[i],
+            bus.steady_moments[i],
+        )  # fmt: skip
         own = control.memory[width * i : width * (i + 1)]
         _control(
             Wire(control.kernel, control.key, control.params, own, viewed, wishes), step, time, dt
         )
     for k in range(3):
-        force = steady = 0.0
+        force = steady = moment = lasting = 0.0
         for i in range(n):
             force += bus.wishes[i, k] / n
             steady += bus.steady_wishes[i, k] / n
+            moment += bus.wished_moments[i, k] / n
+            lasting += bus.steady_moments[i, k] / n
         bus.force[k], bus.steady_force[k] = force, steady
+        bus.moment[k], bus.steady_moment[k] = moment, lasting
 
 
 @register_jitable

@@ -47,14 +47,13 @@ Wires = named_tuple("Wires", FUNCTIONS, __name__)
 """One :class:`~colift.kernel.ports.Wire` a port."""
 Common = named_signals(
     "Common",
-    [
+    dict.fromkeys([
         "row", "tensions", "allocator_up", "allocator_info", "wind", "external_forces", "external_moment",
         "peak_tensions", "catch_impulses", "touch_speeds", "carrying", "clock", "clock_bends", "lean", "formations", "formation", "reference",
         "reference_attitude", "reference_rates", "nominal_forces", "attachments",
         "estimated_load", "estimated_load_attitude", "estimated_load_rates", "estimated_ends", "wanted_ends", "reference_shift",
-        "lift_share", "unhooked", "attached", "winches", "reeled",
-        *(name for name in agents.SIGNALS if name not in {"carrying", "reference", "estimated_load"}),
-    ],
+        "lift_share", "unhooked", "attached", "winches", "reeled", *agents.SIGNALS,
+    ]),
     __name__,
 )  # fmt: skip
 """What the loop itself sees and writes of the bus."""

@@ -254,7 +254,10 @@ PORTS: dict[str, Port] = {
         Port("network", sees=("outboxes", "members")),
         Port(
             "agents",
-            sees=("wish", "steady_wish", "reference", "number", "members", "inbox", "heard", "evidence", "felt", "velocity"),
+            sees=(
+                "wish", "steady_wish", "wish_moment", "steady_moment", "reference", "reference_attitude", "load_attitude", "formation",
+                "number", "members", "inbox", "heard", "evidence", "felt", "velocity",
+            ),
             answers=True,
             table={signal.name: signal for signal in OF_ONE},
         ),

@@ -182,11 +182,14 @@ MESSAGE = 30
 
 MESSAGES = (
     Signal("steady_force", (3,), "N", "-", "world", "part of the wanted force that is not feedback of the moment: planned and learned", writer="load_control"),
+    Signal("steady_moment", (3,), "N m", "-", "world", "part of the wanted moment that is learned", writer="load_control"),
     Signal("load_views", ("n", 2, 3), "m, N", "-", "world", "by how much each drone takes the load to be elsewhere than estimated, and to be pushed otherwise", writer="sensing"),
     Signal("viewed_load", (2, 3), "m, m/s", "-", "world", "the load as the drone estimates it whose load controller runs"),
     Signal("viewed_forces", ("n+1", 3), "N", "-", "world", "external forces as that drone knows them"),
     Signal("wishes", ("n", 3), "N", "-", "world", "total force on the load that each drone wants"),
     Signal("steady_wishes", ("n", 3), "N", "-", "world", "the part of each that is not feedback of the moment"),
+    Signal("wished_moments", ("n", 3), "N m", "-", "world", "moment on the load that each drone wants"),
+    Signal("steady_moments", ("n", 3), "N m", "-", "world", "the part of each that is learned"),
     Signal("plans", ("n", 4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives, by each drone's clock"),
     Signal("felt_forces", ("n", 3), "N", "-", "world", "force of all cables on the load, as each drone measures it; not numbers where it does not", initial=np.nan),
     Signal("views", ("n", "n"), "1", "-", "-", "1 where a drone takes another to be in the team", writer="agents"),
@@ -231,6 +234,11 @@ HIDDEN = (ANSWER, NOMINAL, WINCHES, ATTACHMENTS, *LEAD, *ENDS, *MESSAGES, *OTHER
 OF_ONE = (
     Signal("wish", (3,), "N", "-", "world", "total force on the load that this drone wants"),
     Signal("steady_wish", (3,), "N", "-", "world", "the part of it that is not feedback of the moment"),
+    Signal("wish_moment", (3,), "N m", "-", "world", "moment on the load that this drone wants"),
+    Signal("steady_moment", (3,), "N m", "-", "world", "the part of it that is learned"),
+    Signal("reference_attitude", (4,), "1", "q_Ld", "load to world", "wanted attitude of the load, wxyz", initial=LEVEL),
+    Signal("load_attitude", (4,), "1", "-", "load to world", "its attitude as this drone estimates it, wxyz", initial=LEVEL),
+    Signal("formation", ("n", 3), "1", "-", "wanted heading", "cables' forces in hover over the load's weight, as they are planned; zeros where nobody plans them"),
     Signal("number", (1,), "1", "-", "-", "this drone's number in the mission"),
     Signal("members", ("n",), "1", "-", "-", "the numbers of the team, in the order of what has one row a drone"),
     Signal("reference", (4, 3), "m, m/s, m/s^2, m/s^3", "x_Ld", "world", "wanted load position and three derivatives, by this drone's clock"),

@@ -48,15 +48,24 @@ CONTEST, SPREAD = "contest", "spread"
 
 
 def contestants(
-    wanted: Sequence[str] | None, own: Sequence[str] = (), layer: str = "allocation"
+    wanted: Sequence[str] | None,
+    own: Sequence[str] = (),
+    layer: str = "allocation",
+    missions: Sequence[str] = (),
 ) -> tuple[list[str], list[str]]:
     """Allocators, or parts of another layer, that can fly here, and a sentence for each that cannot.
 
-    ``wanted`` None stands for all; ``own`` are always among them.
+    ``wanted`` None stands for all, but for agents that none of the ``missions`` is for; ``own`` are always among them.
     """
     able, missing = [], []
+    teams = [load_mission(name).team for name in missions] if layer == "agents" else []
     for name in dict.fromkeys([*(answering(layer) if wanted is None else wanted), *own]):
-        why = find(layer, name).missing()
+        part = find(layer, name)
+        why = part.missing()
+        if not why and wanted is None and name not in own:
+            refused = [found for team in teams if (found := part().check(team))]
+            if refused and len(refused) == len(teams):
+                why = refused[0][0][1]
         if not why:
             able.append(name)
         elif wanted is None:

@@ -10,7 +10,8 @@ bytes  what
 11-16  pull beside its share of the wish, likewise
 17-21  a pair: peer (4 bits), version (3) and first (1) of its own reference, answered version (3), yes (1),
        session of the peer (4; 0: never heard), reference (24)
-22-26  another pair
+22-26  another pair; of a team on a rigid load what is learned of the moment, three numbers of 13 bits, in the frame of the wanted load, as the pull
+       beside the plan then is; the wish is what is learned of the force, in the world
 27-29  seal over all of it and the high bits of the count
 ====== ===========================================================================================
 
@@ -29,6 +30,9 @@ MOST = 16
 """Drones in a team: as many as four bits can number."""
 WHO, COUNT, TEAM, WISH, SHARE, PAIRS, SEAL = 0, 1, 3, 5, 11, 17, 27
 PAIR = 5
+MOMENT = PAIRS + PAIR
+LARGEST = 4095
+"""Largest number that 13 bits hold."""
 NOBODY = 0
 """The view of the team of one that has left it."""
 SIDE = 4094
@@ -96,6 +100,28 @@ def get_pair(message, at):  # type: ignore[no-untyped-def]
     return (
         bits & 15, (bits >> 4) & 7, (bits >> 7) & 1, (bits >> 8) & 7, (bits >> 11) & 1, (bits >> 12) & 15, bits >> 16,
     )  # fmt: skip
+
+
+@inline
+def put_moment(message, k, value):  # type: ignore[no-untyped-def]
+    """Write the number k of a moment, rounded, into its 13 bits; what is no number as 0."""
+    number = LARGEST
+    if value == value:
+        number = int(min(max(value, -LARGEST), LARGEST) + LARGEST + 0.5)
+    for bit in range(13):
+        at = 13 * k + bit
+        byte = int(message[MOMENT + (at >> 3)])
+        message[MOMENT + (at >> 3)] = byte ^ ((byte >> (at & 7) ^ number >> bit) & 1) << (at & 7)
+
+
+@inline
+def get_moment(message, k):  # type: ignore[no-untyped-def]
+    """That number."""
+    number = 0
+    for bit in range(13):
+        at = 13 * k + bit
+        number |= ((int(message[MOMENT + (at >> 3)]) >> (at & 7)) & 1) << bit
+    return float(min(number - LARGEST, LARGEST))
 
 
 @inline

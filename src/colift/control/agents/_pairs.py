@@ -11,6 +11,13 @@ round: so there is always one plane that both obey, and between the caps on its 
 An offer is decided once: adopted if the drone is on its side of every plane that would follow, else refused for good. Whoever
 knows nothing of a peer, at first or after a restart, stands still; what it offers then is marked as first, and is adopted
 however near it is. A drone beyond a plane, as one that begins too near, may only come closer to it.
+
+Cables that end on a body are kept apart in metres. A reference is the place of a drone then, ``-L_i r_i`` from its end, and the plane the one in the
+middle between both, of which each drone keeps ``h`` with a cable of length ``L_i``::
+
+    n . (L_i a_i + m) >= h        D = L_i r_i + E - L_j r_j,  n = D / |D|,  m = (E - L_i r_i - L_j r_j) / 2
+
+``E`` is the peer's end from the own one. It is a cap of directions again. Both ends must lie on their sides: then so do the whole cables.
 """
 
 from __future__ import annotations
@@ -26,11 +33,13 @@ PEER = Layout(
         "inside": 1, "gone": 1, "left": 1, "liar": 1, "holds": 1, "doubt": 1, "met": 1, "usual": 3, "count": 1, "silent": 1, "session": 1, "wish": 3, "share": 3,
         "state": 1, "version": 1, "code": 1, "r0": 3, "r1": 3, "reach": 1,
         "known": 1, "rb": 3, "seen": 1, "yes": 1, "due": 1,
+        "own": 1, "other": 1, "end": 3, "gap": 1,
     }
 )  # fmt: skip
 """What a drone keeps of each peer. ``silent``: cycles since it was heard; ``reach``: share of the way to where it wants to be that is
 offered; ``gone``: left out by what the load did, as a ``liar``
-though it speaks; ``left``: it has said so itself; ``usual``: pull, of one that was ``met``, for a while; ``seen``: version decided last; ``due``: it waits for an answer."""
+though it speaks; ``left``: it has said so itself; ``usual``: pull, of one that was ``met``, for a while; ``seen``: version decided last; ``due``: it waits for an answer;
+``own``, ``other``: lengths of both cables, 0 where all end in one point; ``end``: its end from the own one; ``gap``: how far either end is to be from the plane."""
 Q, WIDTH = PEER.at, PEER.size(0)
 SETTLED, OFFERED, FIRST = 0.0, 1.0, 2.0
 """``state`` of the own reference: r1 is out only in the second."""
@@ -43,37 +52,48 @@ LEAST = 0.05
 
 
 @inline
-def _apart(memory, p, q):  # type: ignore[no-untyped-def]
-    """Whether two references leave a plane between them."""
-    square = 0.0
-    for k in range(3):
-        d = memory[p + k] - memory[q + k]
-        square += d * d
-    return square > APART * APART
+def plane(memory, o, p, q, least):  # type: ignore[no-untyped-def]
+    """The plane between the own reference at ``p`` and that at ``q`` of the peer at ``o``.
+
+    Whether there is one; its unit normal towards the own side; the least product of a direction with it.
+    """
+    own, other = memory[o + Q.own], memory[o + Q.other]
+    rigid = own > 0.0
+    if not rigid:
+        own = other = 1.0
+    x = own * memory[p] - other * memory[q]
+    y = own * memory[p + 1] - other * memory[q + 1]
+    z = own * memory[p + 2] - other * memory[q + 2]
+    if rigid:
+        x, y, z = x + memory[o + Q.end], y + memory[o + Q.end + 1], z + memory[o + Q.end + 2]
+    square = x * x + y * y + z * z
+    norm = 1.0 / math.sqrt(max(square, 1e-12))
+    x, y, z = x * norm, y * norm, z * norm
+    good = square > APART * APART
+    if rigid:
+        away = x * memory[o + Q.end] + y * memory[o + Q.end + 1] + z * memory[o + Q.end + 2]
+        off = x * (own * memory[p] + other * memory[q])
+        off += y * (own * memory[p + 1] + other * memory[q + 1])
+        off += z * (own * memory[p + 2] + other * memory[q + 2])
+        off = 0.5 * (away - off)
+        good = good and off >= memory[o + Q.gap] and away - off >= memory[o + Q.gap]
+        least = (least - off) / own
+    return good, x, y, z, least
 
 
 @inline
-def side(memory, a, p, q):  # type: ignore[no-untyped-def]
-    """Height of the direction at place ``a`` over the plane between the references at ``p`` and ``q``, towards ``p``."""
-    along = square = 0.0
-    for k in range(3):
-        d = memory[p + k] - memory[q + k]
-        along += memory[a + k] * d
-        square += d * d
-    return along / math.sqrt(max(square, 1e-12))
-
-
-@inline
-def keeps(memory, a, p, q, least):  # type: ignore[no-untyped-def]
+def keeps(memory, o, a, p, q, least):  # type: ignore[no-untyped-def]
     """Whether the direction at place ``a`` is on its own side of that plane."""
-    return _apart(memory, p, q) and side(memory, a, p, q) >= least
+    good, x, y, z, least = plane(memory, o, p, q, least)
+    return good and memory[a] * x + memory[a + 1] * y + memory[a + 2] * z >= least
 
 
 @inline
-def _no_worse(memory, w, a, p, q, least):  # type: ignore[no-untyped-def]
+def _no_worse(memory, o, w, a, p, q, least):  # type: ignore[no-untyped-def]
     """The same of one at place ``w``, or that it is no farther beyond than that at ``a``."""
-    height = side(memory, w, p, q)
-    return height >= least or height >= side(memory, a, p, q)
+    _, x, y, z, least = plane(memory, o, p, q, least)
+    height = memory[w] * x + memory[w + 1] * y + memory[w + 2] * z
+    return height >= least or height >= memory[a] * x + memory[a + 1] * y + memory[a + 2] * z
 
 
 @inline
@@ -111,11 +131,11 @@ def decide(memory, o, a, scratch, version, first, yes, code, least):  # type: ig
     x, y, z = direction_of(code)
     memory[scratch], memory[scratch + 1], memory[scratch + 2] = x, y, z
     if known:
-        good = keeps(memory, a, o + Q.r0, scratch, least)
+        good = keeps(memory, o, a, o + Q.r0, scratch, least)
         if memory[o + Q.state] == OFFERED:
-            good = good and keeps(memory, a, o + Q.r1, scratch, least)
+            good = good and keeps(memory, o, a, o + Q.r1, scratch, least)
     else:
-        good = _apart(memory, o + Q.r0, scratch)
+        good, _, _, _, _ = plane(memory, o, o + Q.r0, scratch, least)
     memory[o + Q.due] = 1.0
     if (
         not good and standing
@@ -162,7 +182,7 @@ def offer(memory, o, a, x, y, z, least):  # type: ignore[no-untyped-def]
     if square < NEWS * NEWS:
         return False
     memory[o + Q.r1], memory[o + Q.r1 + 1], memory[o + Q.r1 + 2] = x, y, z
-    if not keeps(memory, a, o + Q.r1, o + Q.rb, least):
+    if not keeps(memory, o, a, o + Q.r1, o + Q.rb, least):
         return False
     memory[o + Q.code] = code
     memory[o + Q.version] = (memory[o + Q.version] + 1.0) % 8
@@ -187,10 +207,10 @@ def allowed(memory, peers, w, a, least, cone):  # type: ignore[no-untyped-def]
         o = peers + WIDTH * j
         if not here(memory, o):
             continue
-        if not _no_worse(memory, w, a, o + Q.r0, o + Q.rb, least):
+        if not _no_worse(memory, o, w, a, o + Q.r0, o + Q.rb, least):
             return False
         if memory[o + Q.state] == OFFERED and not _no_worse(
-            memory, w, a, o + Q.r1, o + Q.rb, least
+            memory, o, w, a, o + Q.r1, o + Q.rb, least
         ):
             return False
     return True

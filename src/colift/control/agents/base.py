@@ -38,6 +38,9 @@ class AgentPart(Part):
     decides: ClassVar[bool] = True
     """Whether drones decide for themselves; else the allocator's answer is flown and no agent is called."""
 
+    wrenches: ClassVar[bool] = False
+    """Whether it shares a moment, as a rigid load needs, too."""
+
     remembers: ClassVar[Layout] = Layout()
 
     def memory(self, team: Team) -> Vector:
@@ -47,6 +50,6 @@ class AgentPart(Part):
     def check(self, team: Team) -> list[tuple[str, str]]:
         if self.memory(team).size % team.n:
             return [("kind", "its memory must be the same for each drone, and nothing beside it")]
-        if self.decides and team.body is not None:
-            return [("kind", "shares forces only, on a load that is a point (load.kind)")]
+        if self.decides and not self.wrenches and team.body is not None:
+            return [("kind", "shares forces only: a rigid load needs leaderless-wrench")]
         return super().check(team)

@@ -189,26 +189,22 @@ def _view(sees, memory, me, n, count, late, started):  # type: ignore[no-untyped
 @inline
 def _push_in(memory, params, x, y, z):  # type: ignore[no-untyped-def]
     """The direction (x, y, z), pushed to the near side of every plane that it is beyond, and into the cone."""
-    sine = params[P.least] + 1e-6
-    cosine = math.sqrt(1.0 - sine * sine)
     for _ in range(ROUNDS):
         moved = False
         for m in range(2 * MOST + 1):
             o = M.peers + WIDTH * (m >> 1)
-            nx, ny, nz, least, rest = 0.0, 0.0, -1.0, params[P.cone] + 1e-6, 0.0
+            nx, ny, nz, least = 0.0, 0.0, -1.0, params[P.cone]
             if m < 2 * MOST:
                 if not pairs.here(memory, o):
                     continue
                 if m & 1 == 1 and memory[o + Q.state] != OFFERED:
                     continue
                 r = o + Q.r0 if m & 1 == 0 else o + Q.r1
-                nx = memory[r] - memory[o + Q.rb]
-                ny = memory[r + 1] - memory[o + Q.rb + 1]
-                nz = memory[r + 2] - memory[o + Q.rb + 2]
-                norm = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
-                nx, ny, nz, least, rest = nx * norm, ny * norm, nz * norm, sine, cosine
-            else:
-                rest = math.sqrt(max(1.0 - least * least, 0.0))
+                _, nx, ny, nz, least = pairs.plane(memory, o, r, o + Q.rb, params[P.least])
+            least += 1e-6
+            if abs(least) >= 1.0:  # nowhere, or everywhere
+                continue
+            rest = math.sqrt(1.0 - least * least)
             along = x * nx + y * ny + z * nz
             if along >= least:
                 continue

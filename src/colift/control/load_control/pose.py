@@ -81,7 +81,7 @@ def hold_pose(dt, errors, force, moment, sees, params, memory, writes):  # type:
     turn = matrix_times(J, params, e_R)
     spin = matrix_times(J, params, e_W)
     stands = sees.standing[last] != 0.0
-    M_L = writes.moment
+    M_L, steady = writes.moment, writes.steady_moment
     for k in range(3):
         S = M.moment + k
         if not stands:
@@ -89,9 +89,13 @@ def hold_pose(dt, errors, force, moment, sees, params, memory, writes):  # type:
         memory[S] = min(max(memory[S], -params[P.most]), params[P.most])
         M_L[k] = gyration[k] + ahead[k] - params[P.k_R] * turn[k] - params[P.k_W] * spin[k]
         M_L[k] += memory[S] + moment[k]
+        steady[k] = memory[S] + moment[k]
     M_L[0], M_L[1], M_L[2] = quaternion.into_world(
         q[0], q[1], q[2], q[3], M_L[0], M_L[1], M_L[2]
     )  # fmt: skip
+    steady[0], steady[1], steady[2] = quaternion.into_world(
+        q[0], q[1], q[2], q[3], steady[0], steady[1], steady[2]
+    )
 
     # The centre of mass, as it is and as it should be.
     at = quaternion.into_world(q[0], q[1], q[2], q[3], c[0], c[1], c[2])
