@@ -34,7 +34,7 @@ SOLVERS = {
 }
 """Where the general solver has its second derivatives from."""
 TOLERANCE, STEPS = 3e-4, 50
-"""Of the general solver: with it answers are exact, below it single precision stalls; and steps at most."""
+"""Of the general solver, and its steps at most: the third setting that was tried, the first with which its answers are exact."""
 INNER = 1e-5
 """Tolerance of its quadratic programs: their default is one of double precision, and never met."""
 EXACT = 1e-3
