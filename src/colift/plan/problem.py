@@ -31,6 +31,8 @@ ENOUGH = 1e-9
 """Cost that is none."""
 STALLED = 1e-5
 """Share of the cost by which it has to fall in three iterations. Time makes most of it, and gets shorter by small steps along the limits."""
+FAINT = 0.1
+"""Share of its weight by which a limit on thrust or rate that holds damps a step: else nothing stands against steps that turn bodies at once."""
 NEVER = -1e9
 """Excess over a limit that nothing was held to."""
 KINDS = ("obstacle", "separation", "thrust", "rate", "tension", "speed")
@@ -315,10 +317,14 @@ def assemble(  # type: ignore[no-untyped-def]
                 else:
                     excess, w, which = params[P.slack] + margins[4] - n * size[i], UNITS[3], 4
                 worst[which] = max(worst[which], excess)
-                if excess <= 0.0:
+                r = 0.0
+                if excess > 0.0:
+                    r, w = _tamed(w * excess, w)
+                    cost += 0.5 * r * r
+                elif kind & 1 or kind == 4 or s & 1:
                     continue
-                r, w = _tamed(w * excess, w)
-                cost += 0.5 * r * r
+                else:
+                    w *= FAINT
                 if not fill:
                     continue
                 if kind <= 1:
