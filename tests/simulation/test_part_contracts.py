@@ -43,6 +43,8 @@ def mission_with(layer, name, **overrides):
     table = {"name": "test", "reference": {"kind": "spiral"}, "timing": {"duration": 1.2}}
     if name == "motor-degraded":
         table["actuation"] = {"kind": "motors"}
+    if name == "leaderless-wrench":  # for a load with an attitude only
+        table["load"] = {"kind": "rigid", "mass": 0.5, "size": [0.6, 0.4, 0.2]}
     table[layer] = [{"kind": name}] if layer in part.LISTS else {"kind": name}
     return load_mission(table, overrides)
 
