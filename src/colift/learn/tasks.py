@@ -23,9 +23,9 @@ TERMS = {
 """What a step is rewarded for, each times its weight in the task."""
 
 ENDS = {
-    FAR: ("far", "the load is further from where it is wanted than `reach`"),
+    FAR: ("far", "the load is further from where it is wanted than the task's reach"),
     TOUCHED: ("touched", "two drones, a drone and its cable's end, or anything and an obstacle touch"),
-    BELOW: ("below", "a drone that carries is less than `least_height` of its cable above the cable's end"),
+    BELOW: ("below", "a drone that carries is less above its cable's end than the task's least height, in cable lengths"),
     NO_NUMBERS: ("no numbers", "a signal is not finite"),
 }  # fmt: skip
 """Why an episode is over before its time."""
