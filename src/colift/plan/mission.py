@@ -19,7 +19,7 @@ PERIOD = 0.002
 TRACKED = 0.1
 """Distance from the plan within which the load is to stay, m."""
 TILT = 85.0
-"""Most tilt of a drone, degrees: plans lean further than the position controller would by itself."""
+"""Most tilt of a drone, and of the force on the load, degrees: plans lean further than the controllers would by themselves."""
 DIGITS = 12
 """Decimals of control points."""
 HOLD, AFTER = 1.0, 2.0
@@ -63,6 +63,7 @@ def mission_of(plan: Plan) -> dict[str, Any]:
             "min_height_m": {"min": float(plan.load_points[:, 2].min()) - TRACKED},
         },
         "plant": {"kind": "slack-cables"},
+        "load_control": {"kind": "balance", "max_lean_deg": TILT},
         "allocation": {"kind": "planned"},
         "position_control": {"kind": "formation", "max_tilt_deg": TILT},
         "reference": {
