@@ -26,7 +26,7 @@ def test_planned_angular_acceleration_is_the_change_of_the_planned_rate():
         p = thrust(t)
         size = np.linalg.norm(p)
         aim_along(0, k == 0, DT, 0.9, p, p[None], size, aimed, 0, thrusts, attitudes, rates)
-        more = look_ahead(0, k == 0, DT, 0.1, 0.0, p, ahead, 0, attitudes, rates, turning)
+        more = look_ahead(0, k == 0, DT, 0.1, 0.0, 1.0, p, ahead, 0, attitudes, rates, turning)
         told.append(rates[0].copy())
         wanted.append(turning[0].copy())
         sizes.append(size + more)

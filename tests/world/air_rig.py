@@ -13,9 +13,10 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Air:
     """n drones and a load for one disturbance; :meth:`act` gives wind and forces of one step."""
 
-    def __init__(self, part, n=1, *, key=7, dt=0.001):
+    def __init__(self, part, n=1, *, key=7, dt=0.001, team=None):
         self.part, self.n, self.key, self.dt = part, n, key, dt
-        self.team, self.memory = Team.uniform(n), part.memory(Team.uniform(n))
+        self.team = team or Team.uniform(n)
+        self.memory = part.memory(self.team)
         self.load = np.zeros((2, 3))
         self.positions = np.tile([0.0, 0.0, 1.0], (n, 1))
         self.velocities, self.attitudes = np.zeros((n, 3)), np.tile(UPRIGHT, (n, 1))

@@ -10,14 +10,14 @@ from air_rig import Air
 
 from colift.errors import MissionError
 from colift.mission import load_mission
-from colift.team import Ground
+from colift.team import Ground, Team
 from colift.world.disturbance.ground_effect import GroundEffect
 
 
 def lifted(height, *, ground=0.0, attitude=(1.0, 0.0, 0.0, 0.0)):
     """Extra force on a drone of 10 N of thrust whose rotors, of 0.2 m radius, are 0.05 m above its centre."""
-    air = Air(GroundEffect(rotor_radius=0.2, rotor_height=0.05))
-    air.team = replace(air.team, ground=Ground(ground))
+    team = replace(Team.uniform(1), ground=Ground(ground))
+    air = Air(GroundEffect(rotor_radius=0.2, rotor_height=0.05), team=team)
     air.positions[0] = [3.0, -2.0, height - 0.05]
     air.attitudes[0] = attitude
     air.thrusts[0] = 10.0

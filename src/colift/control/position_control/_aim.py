@@ -113,17 +113,18 @@ AHEAD = 15
 
 
 @inline
-def look_ahead(i, fresh, dt, keep, lag, p, memory, o, attitudes, rates, turning):  # type: ignore[no-untyped-def]
+def look_ahead(i, fresh, dt, keep, lag, smooth, p, memory, o, attitudes, rates, turning):  # type: ignore[no-untyped-def]
     """What the thrust vector ``p`` (3,) that is planned of drone i, free of any feedback, will be while a command acts.
 
     By half a period and ``lag`` the size of the thrust is led, which is returned: it is held for a period. Its direction is not, for attitudes follow the wanted rate in
     between. Its angular acceleration, body frame, is put into ``turning[i]``: with ``p = s b``, ``b'' = (p'' - s'' b - 2 s' b') / s`` and, about the
-    body's axis ``b``, ``b'' = alpha x b + omega x (omega x b)``. ``memory[o : o + 15]`` holds the last planned vector, its last differences, the second of them filtered, and
+    body's axis ``b``, ``b'' = alpha x b + omega x (omega x b)``. Where the plan is not ``smooth`` (1 or 0), as it follows answers that are held, only ``p''`` counts, as
+    late as it is known: products and extrapolations of its steps disturb more than they tell. ``memory[o : o + 15]`` holds the last planned vector, its last differences, the second of them filtered, and
     both derivatives as they will be.
     """
     q = attitudes[i]
     size = math.sqrt(max(p[0] * p[0] + p[1] * p[1] + p[2] * p[2], 1e-12))
-    half, late = 0.5 * dt, 1.5 + keep / (1.0 - keep)
+    half, late = 0.5 * dt, smooth * (1.5 + keep / (1.0 - keep))
     stretch = 0.0
     for k in range(3):
         rate = 0.0 if fresh else (p[k] - memory[o + k]) / dt
@@ -143,8 +144,8 @@ def look_ahead(i, fresh, dt, keep, lag, p, memory, o, attitudes, rates, turning)
     x, y, _ = quaternion.into_body(
         q[0], q[1], q[2], q[3], memory[o + 12], memory[o + 13], memory[o + 14]
     )
-    twice = 2.0 * stretch / size
-    turning[i, 0] = (twice * by - y + rates[i, 2] * bx) / size
-    turning[i, 1] = (x - twice * bx + rates[i, 2] * by) / size
+    twice, spin = smooth * 2.0 * stretch / size, smooth * rates[i, 2]
+    turning[i, 0] = (twice * by - y + spin * bx) / size
+    turning[i, 1] = (x - twice * bx + spin * by) / size
     turning[i, 2] = 0.0
     return (lag + half) * stretch

@@ -130,6 +130,7 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
         if math.isnan(nominal[0, 0, 0]):
             nominal = kept[kept.shape[0] - 9 * n :].reshape(n, 3, 3)
     follows = params[P.rigid] > 0.0 or not math.isnan(nominal[0, 0, 0])  # the cables are planned
+    smooth = 0.0 if params[P.rigid] > 0.0 else 1.0  # by a reference, not by answers that are held
     height = 0.0
     for i in range(n):
         o, L = M.rows + M.width * i, params[P.rows + P.width * i + P.L] + reeled[i, 0] + found[i]
@@ -222,12 +223,13 @@ def _hold_formation(now, sees, params, memory, writes):  # type: ignore[no-untyp
             i, fresh, dt, keep, planned, u, norm, memory, o + M.aim, thrusts, attitudes, rates
         )
         if follows and not led and sees.standing[i] == 0.0:
-            thrusts[i] += look_ahead(
-                i, fresh, dt, keep_plan, params[P.lag], planned, memory, o + M.ahead, sees.estimated_attitudes, rates,
-                writes.desired_turning,
+            more = look_ahead(
+                i, fresh, dt, keep_plan, params[P.lag], smooth, planned, memory, o + M.ahead, sees.estimated_attitudes,
+                rates, writes.desired_turning,
             )  # fmt: skip
+            thrusts[i] += more
             for k in range(3):  # a difference is that of the middle of the last period
-                rates[i, k] += 0.5 * dt * writes.desired_turning[i, k]
+                rates[i, k] += 0.5 * smooth * dt * writes.desired_turning[i, k]
 
 
 class Formation(PositionControlPart, Delays):
