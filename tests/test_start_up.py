@@ -151,7 +151,10 @@ except ValueError as error:
     print(error.args)
 """
     said = []
-    for added in ("1.0", "2.0"):
+    for added in (
+        "1.0",
+        "2.00",
+    ):  # of another length: Python's own cache knows a file by its second and size
         (tmp_path / "outer.py").write_text(outer.format(added))
         done = subprocess.run(
             [sys.executable, "-c", program.format(folder=str(tmp_path))],

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from colift.plan.by_turns import TurnPlan
 
 
-@app.command()
+@app.command(name="plan-by-turns")
 def plan_by_turns(
     scene: Annotated[Path, typer.Argument(help="Scene, a YAML file of the public kind.")],
     duration: Annotated[float, typer.Option(help="Of the plan, s.", min=0.1, max=3600)] = 10.0,
