@@ -1,6 +1,7 @@
 """Write how drones that plan in turns come to agree on a doorway (docs/plan.md).
 
-From ``by_turns.json`` beside this file: ``python docs/figures/by_turns.py [--fly]``; ``--fly`` plans all anew.
+From ``by_turns.json`` beside this file: ``OPENBLAS_NUM_THREADS=1 python docs/figures/by_turns.py [--fly]``; ``--fly`` plans all anew. On more threads
+the processor time of all counts, and plans that do not agree end elsewhere.
 """
 
 from pages import DOCS, fill, stored, table

@@ -27,46 +27,19 @@ FAULTS = (
     "cable cut;drone dead, on its cable;drone dead, cable cut;one motor dead;one motor at half;battery down to 70 %;"
     "drone's sensors stuck, 0.2 s;drone's sensors stuck for good;load's sensors stuck, 0.1 s;allocator silent, 0.3 s"
 )
+DRAGGED = [
+    "--conditions", "wind;all, load +50 %;all, load -50 %;cable cut in wind;one motor dead in wind",
+    "--set", "drones.rotor_drag=0.05", "--set", "disturbance.3.rotor_drag=0.05",
+]  # fmt: skip
+HALF = ["--conditions", "all, load -50 %"]
 CAMPAIGNS = {
     "weather": (["--conditions", WEATHER], 1),
     "faults": (["--conditions", FAULTS], 4),
     "storm": (["--conditions", "* in wind;* in all, load +50 %;* in all, load -50 %"], 8),
-    "drag": (
-        [
-            "--conditions",
-            "wind;all, load +50 %;all, load -50 %;cable cut in wind;one motor dead in wind",
-            "--set",
-            "drones.rotor_drag=0.05",
-            "--set",
-            "disturbance.3.rotor_drag=0.05",
-        ],
-        4,
-    ),
-    "fresh": (["--conditions", "all, load -50 %"], 2),
-    "taut": (
-        [
-            "--conditions",
-            "all, load -50 %",
-            "--set",
-            "allocation.tension_min=0.39",
-            "--set",
-            "load_control.rate=0.6",
-        ],
-        2,
-    ),
-    "soft": (
-        [
-            "--conditions",
-            "wind;all, load +50 %;all, load -50 %;cable cut in wind;one motor dead in wind",
-            "--set",
-            "drones.rotor_drag=0.05",
-            "--set",
-            "disturbance.3.rotor_drag=0.05",
-            "--set",
-            "position_control.gain=0.6",
-        ],
-        12,
-    ),
+    "drag": (DRAGGED, 4),
+    "fresh": (HALF, 2),
+    "taut": ([*HALF, "--set", "allocation.tension_min=0.39", "--set", "load_control.rate=0.6"], 2),
+    "soft": ([*DRAGGED, "--set", "position_control.gain=0.6"], 12),
     "plants": (
         [
             "--allocators",

@@ -125,6 +125,10 @@ def test_the_plan_is_flown_within_half_a_centimetre_where_motors_do_not_lag(miss
     assert drones < 0.005
 
 
+def test_lag_of_the_motors_leaves_it_by_little_more_than_a_centimetre(mission):
+    assert max(flown(mission, {})) < 0.012
+
+
 def test_two_commands_plan_and_fly(found, tmp_path):
     write(found, tmp_path / "flight.toml")
     done = colift(

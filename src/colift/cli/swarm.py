@@ -121,14 +121,16 @@ def _fly(
 
 def _tell(result: dict[str, Any]) -> None:
     """Say what came of it."""
+    from colift.flight.swarm.world import WHOLE
+
     out = console()
     out.print(f"Load within {100 * result['tracking_max_m']:.1f} cm of its reference.")
     for each in result["killed"]:
         settled = each["settled"]
         found = (
-            "two seconds later the force still misses more than 2 % of the weight."
+            f"two seconds later the force still misses more than {WHOLE:.0%} of the weight."
             if settled is None
-            else f"within 2 % of the weight after {1e3 * settled:.0f} ms."
+            else f"within {WHOLE:.0%} of the weight after {1e3 * settled:.0f} ms."
         )
         out.print(f"Drone {each['drone']} killed at {each['at']:g} s: {found}", highlight=False)
 

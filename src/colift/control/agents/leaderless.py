@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Annotated, ClassVar
+from collections.abc import Iterable
+from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from colift.control.agents import _evidence as evidence
@@ -15,7 +14,8 @@ from colift.control.agents import _message as message
 from colift.control.agents import _pairs as pairs
 from colift.control.agents._message import MOST
 from colift.control.agents._pairs import FIRST, LEAST, OFFERED, SETTLED, WIDTH, Q
-from colift.control.agents.base import SIGNATURE, AgentPart, Status
+from colift.control.agents._speaking import Speaking
+from colift.control.agents.base import SIGNATURE, Status
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import message as numbers
@@ -100,53 +100,64 @@ def _begin(now, sees, params, memory, writes, n):  # type: ignore[no-untyped-def
 
 
 @inline
-def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
-    """Take what is new, sealed and fresh of those in the team."""
+def hears(now, sees, params, memory, me, row):  # type: ignore[no-untyped-def]
+    """Whether the message of who has this row is new, sealed and fresh; then what it says of its sender and of the team is taken."""
+    j = int(sees.members[row])
+    if row == me or j < 0 or j >= MOST:
+        return False
+    o, text = M.peers + WIDTH * j, sees.inbox[row]
+    memory[o + Q.silent] += 1.0
+    if sees.heard[row] == 0.0:
+        return False
+    count = message.count_near(message.get16(text, message.COUNT), now.step)
+    if abs(count - now.step) * now.dt > params[P.stale]:
+        return False
+    if count <= memory[o + Q.count] or int(text[message.WHO]) & 15 != j:
+        return False
     key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
-    wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
-    for row in range(n):
-        j = int(sees.members[row])
-        if row == me or j < 0 or j >= MOST:
-            continue
-        o = M.peers + WIDTH * j
-        memory[o + Q.silent] += 1.0
-        if sees.heard[row] == 0.0:
-            continue
-        text = sees.inbox[row]
-        count = message.count_near(message.get16(text, message.COUNT), now.step)
-        if abs(count - now.step) * now.dt > params[P.stale]:
-            continue
-        if count <= memory[o + Q.count] or int(text[message.WHO]) & 15 != j:
-            continue
-        if not message.is_sealed(text, (count >> 16) & 0xFFFFFFFF, key_0, key_1):
-            continue
-        memory[o + Q.count] = count
-        memory[o + Q.silent] = 0.0
-        team = message.get16(text, message.TEAM)
-        memory[o + Q.holds] = 1.0 if (team >> j) & 1 == 0 else 0.0
-        memory[o + Q.left] = 1.0 if team == message.NOBODY else 0.0
-        session = (int(text[message.WHO]) >> 4) & 15
-        if session != memory[o + Q.session]:
-            memory[o + Q.session] = session
-            memory[o + Q.liar] = 0.0
-            if memory[o + Q.inside] != 0.0:
-                pairs.stand(memory, o, M.a)
-        for k in range(3):
-            memory[o + Q.wish + k] = wish_unit * numbers.get(text, message.WISH + 2 * k)
-            memory[o + Q.share + k] = share_unit * numbers.get(text, message.SHARE + 2 * k)
-        if memory[o + Q.inside] == 0.0:
-            continue
-        for half in range(2):
-            peer, version, first, answered, yes, known, code = message.get_pair(
-                text, message.PAIRS + message.PAIR * half
-            )
-            if peer == int(sees.number[0]) and known == memory[M.session]:
-                pairs.decide(memory, o, M.a, M.w, version, first, yes, code, params[P.least])
-                pairs.hear_answer(memory, o, first, answered, yes)
+    if not message.is_sealed(text, (count >> 16) & 0xFFFFFFFF, key_0, key_1):
+        return False
+    memory[o + Q.count] = count
+    memory[o + Q.silent] = 0.0
+    team = message.get16(text, message.TEAM)
+    memory[o + Q.holds] = 1.0 if (team >> j) & 1 == 0 else 0.0
+    memory[o + Q.left] = 1.0 if team == message.NOBODY else 0.0
+    session = (int(text[message.WHO]) >> 4) & 15
+    if session != memory[o + Q.session]:
+        memory[o + Q.session] = session
+        memory[o + Q.liar] = 0.0
+        if memory[o + Q.inside] != 0.0:
+            pairs.stand(memory, o, M.a)
+    return True
 
 
 @inline
-def _view(sees, memory, me, n, count, late, started):  # type: ignore[no-untyped-def]
+def hear_pair(sees, params, memory, o, text, at):  # type: ignore[no-untyped-def]
+    """Take what the peer at ``o`` says of both references, if it speaks to this drone as it is now."""
+    peer, version, first, answered, yes, known, code = message.get_pair(text, at)
+    if peer == int(sees.number[0]) and known == memory[M.session]:
+        pairs.decide(memory, o, M.a, M.w, version, first, yes, code, params[P.least])
+        pairs.hear_answer(memory, o, first, answered, yes)
+
+
+@inline
+def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
+    """Take what is new of those in the team."""
+    wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
+    for row in range(n):
+        if not hears(now, sees, params, memory, me, row):
+            continue
+        o, text = M.peers + WIDTH * int(sees.members[row]), sees.inbox[row]
+        for k in range(3):
+            memory[o + Q.wish + k] = wish_unit * numbers.get(text, message.WISH + 2 * k)
+            memory[o + Q.share + k] = share_unit * numbers.get(text, message.SHARE + 2 * k)
+        if memory[o + Q.inside] != 0.0:
+            for half in range(2):
+                hear_pair(sees, params, memory, o, text, message.PAIRS + message.PAIR * half)
+
+
+@inline
+def view_team(sees, memory, me, n, count, late, started):  # type: ignore[no-untyped-def]
     """Who is in the team, of ``count`` until now: silence alone lets nobody out. Returns how many, with this drone."""
     for j in range(MOST):
         o = M.peers + WIDTH * j
@@ -222,7 +233,7 @@ def _push_in(memory, params, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _move(memory, params, x, y, z, most):  # type: ignore[no-untyped-def]
+def move(memory, params, x, y, z, most):  # type: ignore[no-untyped-def]
     """Turn towards the unit vector (x, y, z) as far as all planes allow; where it stands is always allowed."""
     for j in range(MOST):
         o = M.peers + WIDTH * j
@@ -243,7 +254,7 @@ def _move(memory, params, x, y, z, most):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _offer(memory, params, x, y, z):  # type: ignore[no-untyped-def]
+def offer(memory, params, x, y, z):  # type: ignore[no-untyped-def]
     """Offer every peer that has answered a reference on the way to where we want to be."""
     for j in range(MOST):
         o = M.peers + WIDTH * j
@@ -281,18 +292,46 @@ def _next_peer(memory, turn):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[no-untyped-def]
-    text = writes.outbox
+def begin_message(now, sees, memory, text, holding, leaves):  # type: ignore[no-untyped-def]
+    """Say who speaks, when, and whom it takes to be in the team: not itself while it is ``holding``, nobody once it ``leaves``."""
     number = int(sees.number[0])
-    wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
     text[message.WHO] = number | int(memory[M.session]) << 4
     message.put16(text, message.COUNT, now.step & 0xFFFF)
     team = 0 if holding else 1 << number
     for j in range(MOST):
         team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
-    if leaves:
-        team = message.NOBODY
-    message.put16(text, message.TEAM, team)
+    message.put16(text, message.TEAM, message.NOBODY if leaves else team)
+
+
+@inline
+def speak_to_next(sees, memory, text, at):  # type: ignore[no-untyped-def]
+    """Say to the peer whose turn it is where both references are."""
+    j = _next_peer(memory, int(memory[M.turn]))
+    if j < 0:
+        message.put_pair(text, at, int(sees.number[0]), 0, 0, 0, 0, 0, 0)
+        return
+    memory[M.turn] = j
+    o = M.peers + WIDTH * j
+    memory[o + Q.due] = 0.0
+    first = 1 if memory[o + Q.state] == FIRST else 0
+    message.put_pair(
+        text, at, j, int(memory[o + Q.version]), first, int(memory[o + Q.seen]),
+        int(memory[o + Q.yes]), int(memory[o + Q.session]), int(memory[o + Q.code]),
+    )  # fmt: skip
+
+
+@inline
+def seal(now, params, text):  # type: ignore[no-untyped-def]
+    """End the message."""
+    key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
+    message.seal(text, (now.step >> 16) & 0xFFFFFFFF, key_0, key_1)
+
+
+@inline
+def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[no-untyped-def]
+    text = writes.outbox
+    wish_unit, share_unit = params[P.wish_unit], params[P.share_unit]
+    begin_message(now, sees, memory, text, holding, leaves)
     for k in range(3):
         wish, share = message.WISH + 2 * k, message.SHARE + 2 * k
         numbers.put(text, wish, memory[M.steady + k] / wish_unit)
@@ -300,21 +339,8 @@ def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[
         memory[M.said + k] = wish_unit * numbers.get(text, wish)
         memory[M.said + 3 + k] = share_unit * numbers.get(text, share)
     for half in range(2):
-        at = message.PAIRS + message.PAIR * half
-        j = _next_peer(memory, int(memory[M.turn]))
-        if j < 0:
-            message.put_pair(text, at, number, 0, 0, 0, 0, 0, 0)
-            continue
-        memory[M.turn] = j
-        o = M.peers + WIDTH * j
-        memory[o + Q.due] = 0.0
-        first = 1 if memory[o + Q.state] == FIRST else 0
-        message.put_pair(
-            text, at, j, int(memory[o + Q.version]), first, int(memory[o + Q.seen]),
-            int(memory[o + Q.yes]), int(memory[o + Q.session]), int(memory[o + Q.code]),
-        )  # fmt: skip
-    key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
-    message.seal(text, (now.step >> 16) & 0xFFFFFFFF, key_0, key_1)
+        speak_to_next(sees, memory, text, message.PAIRS + message.PAIR * half)
+    seal(now, params, text)
 
 
 @inline
@@ -382,7 +408,7 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
         x, y, z = sees.felt[0], sees.felt[1], sees.felt[2]
     x, y, z = frame.to_frame(memory, M.up, x, y, z)
     evidence.weigh(memory, M.peers, M.lack, (x, y, z), measured, M.pull, team, late, dt)
-    team = _view(sees, memory, me, n, team, late, started)
+    team = view_team(sees, memory, me, n, team, late, started)
 
     holding = others = False
     for k in range(3):
@@ -421,8 +447,8 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     )
     size = math.sqrt(x * x + y * y + z * z)
     if size > 1e-9:
-        _move(memory, params, x / size, y / size, z / size, most)
-        _offer(memory, params, x / size, y / size, z / size)
+        move(memory, params, x / size, y / size, z / size, most)
+        offer(memory, params, x / size, y / size, z / size)
     a = M.a
     row = P.rows + P.width * me
     along = x * memory[a] + y * memory[a + 1] + z * memory[a + 2]
@@ -453,10 +479,7 @@ def _agree(now, sees, params, memory, writes):  # type: ignore[no-untyped-def]
     return (HOLDING if holding or others else FREE) | (CLIPPED if missing > 1e-3 * size else FREE)
 
 
-Force = Annotated[float, Field(gt=0.0, le=1e6)]
-
-
-class Leaderless(AgentPart):
+class Leaderless(Speaking):
     """Each drone bears its own pull beside an equal share of the wanted force, and turns only inside planes agreed with each other drone.
 
     The formation follows the answers of the mission's allocator, which each drone asks for itself; its limits, such as
@@ -465,8 +488,7 @@ class Leaderless(AgentPart):
 
     kernel = _agree
     remembers = MEMORY
-    per_drone = ("tension_min", "tension_max")
-    from_team: ClassVar[Mapping[str, float | None]] = {"tension_min": 0.05, "tension_max": 5.0}
+    least_share = 0.5
 
     min_angle_deg: Annotated[float, Field(gt=0.0, lt=120.0)] = 25.0
     """Least angle between any two cables, degrees, whatever is lost."""
@@ -477,26 +499,10 @@ class Leaderless(AgentPart):
     """Largest angle between a cable and the planned force, degrees."""
     max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 6.0
     """Fastest turn of a cable's direction in the planned frame, rad/s."""
-    tension_min: Force | list[Force] | None = None
-    """Least tension, N; one value, or one per cable. None: half of a cable's share of the load's weight where
-    ``drones.max_thrust`` is known, else 0.05."""
-    tension_max: Force | list[Force] | None = None
-    """Largest tension, N; one value, or one per cable. None: what 0.95 of ``drones.max_thrust`` lifts beside the drone,
-    or 5."""
     settling: Annotated[float, Field(ge=0.0, le=10.0)] = 0.1
     """Time with which the own pull follows what the formation wants, s."""
-    patience: Annotated[float, Field(gt=0.0, le=10.0)] = 0.15
-    """Time after which somebody who is not heard is taken for silent, s."""
-    stale: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    """Age, by the own clock, from which on a message is not heard, s: more than clocks differ by."""
     period: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
     """Time between two questions to the allocator, s."""
-    key: Annotated[str, Field(pattern="^[0-9a-f]{16}$")] = "0" * 16
-    """Secret of the team, 16 hexadecimal digits: a message without its seal is not heard."""
-
-    def check(self, team: Team) -> list[tuple[str, str]]:
-        few = team.n <= MOST
-        return super().check(team) + [("kind", f"is for {MOST} drones at most")] * (not few)
 
     def warnings(self, mission: Setup) -> Iterable[tuple[str, str]]:
         planned = getattr(mission.allocation, "min_angle_deg", None)
@@ -525,21 +531,12 @@ class Leaderless(AgentPart):
                 f"cables start {least:.3g} degrees apart (start): they are led apart first",
             )
 
-    def left_open(self, team: Team) -> dict[str, Vector]:
-        known = np.isfinite(team.max_thrusts)
-        low = 0.5 * team.load_mass * max(team.gravity, 1e-3) / team.n
-        lifts = 0.95 * team.max_thrusts - team.masses * team.gravity
-        return {
-            "tension_min": np.where(known, low, math.nan),
-            "tension_max": np.where(known, np.maximum(lifts, 1.2 * low), math.nan),
-        }
-
     def params(self, team: Team) -> Vector:
         keep = math.radians(min(self.min_angle_deg + self.frame_deg + CODE, 150.0))
         weight = team.load_mass * max(team.gravity, 1e-3)
         return PARAMS.pack(
             team.n, g=team.gravity, least=math.sin(0.5 * keep), cone=math.cos(math.radians(self.max_cone_deg)), rate=self.max_rate,
             settling=self.settling, patience=self.patience, stale=self.stale, period=self.period,
-            wish_unit=WISHES * weight / numbers.MOST, share_unit=SHARES * weight / numbers.MOST, key=(int(self.key[8:], 16), int(self.key[:8], 16)),
+            wish_unit=WISHES * weight / numbers.MOST, share_unit=SHARES * weight / numbers.MOST, key=self.secret,
             low=self.settled("tension_min", team), high=self.settled("tension_max", team),
         )  # fmt: skip

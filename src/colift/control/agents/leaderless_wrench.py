@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Annotated, ClassVar
+from collections.abc import Iterable
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from colift.control.agents import _evidence as evidence
 from colift.control.agents import _message as message
-from colift.control.agents import _pairs as pairs
 from colift.control.agents import leaderless
 from colift.control.agents._message import MOST
-from colift.control.agents._pairs import FIRST, WIDTH, Q
-from colift.control.agents.base import SIGNATURE, AgentPart, Status
-from colift.control.agents.leaderless import BALANCE, WISHES, Force
+from colift.control.agents._pairs import WIDTH, Q
+from colift.control.agents._speaking import Speaking
+from colift.control.agents.base import SIGNATURE, Status
+from colift.control.agents.leaderless import BALANCE, WISHES
 from colift.kernel.jit import inline, kernel
 from colift.kernel.layout import Layout
 from colift.kernel.math import message as numbers
@@ -96,9 +96,8 @@ def _begin(memory, writes):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
-    """Take what is new, sealed and fresh of those in the team."""
-    key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
+def _know(sees, params, memory, me, n):  # type: ignore[no-untyped-def]
+    """Lengths and ends that the planes between this drone's cable and each other are made of."""
     own = P.rows + P.width * me
     for row in range(n):
         j = int(sees.members[row])
@@ -109,50 +108,29 @@ def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
         memory[o + Q.gap] = params[P.gap]
         for k in range(3):
             memory[o + Q.end + k] = params[other + P.arm + k] - params[own + P.arm + k]
-        memory[o + Q.silent] += 1.0
-        if sees.heard[row] == 0.0:
+
+
+@inline
+def _listen(now, sees, params, memory, me, n):  # type: ignore[no-untyped-def]
+    """Take what is new of those in the team."""
+    for row in range(n):
+        if not leaderless.hears(now, sees, params, memory, me, row):
             continue
-        text = sees.inbox[row]
-        count = message.count_near(message.get16(text, message.COUNT), now.step)
-        if abs(count - now.step) * now.dt > params[P.stale]:
-            continue
-        if count <= memory[o + Q.count] or int(text[message.WHO]) & 15 != j:
-            continue
-        if not message.is_sealed(text, (count >> 16) & 0xFFFFFFFF, key_0, key_1):
-            continue
-        memory[o + Q.count], memory[o + Q.silent] = count, 0.0
-        team = message.get16(text, message.TEAM)
-        memory[o + Q.holds] = 1.0 if (team >> j) & 1 == 0 else 0.0
-        memory[o + Q.left] = 1.0 if team == message.NOBODY else 0.0
-        session = (int(text[message.WHO]) >> 4) & 15
-        if session != memory[o + Q.session]:
-            memory[o + Q.session] = session
-            memory[o + Q.liar] = 0.0
-            if memory[o + Q.inside] != 0.0:
-                pairs.stand(memory, o, M.a)
+        j, text = int(sees.members[row]), sees.inbox[row]
         for k in range(3):
             at, share = M.wished + 6 * j + k, message.SHARE + 2 * k
             memory[at] = params[P.wish_unit] * numbers.get(text, message.WISH + 2 * k)
             memory[at + 3] = params[P.moment_unit] * message.get_moment(text, k)
             memory[M.held + 3 * j + k] = params[P.share_unit] * numbers.get(text, share)
-        if memory[o + Q.inside] == 0.0:
-            continue
-        peer, version, first, answered, yes, known, code = message.get_pair(text, message.PAIRS)
-        if peer == int(sees.number[0]) and known == memory[M.session]:
-            pairs.decide(memory, o, M.a, M.w, version, first, yes, code, params[P.least])
-            pairs.hear_answer(memory, o, first, answered, yes)
+        o = M.peers + WIDTH * j
+        if memory[o + Q.inside] != 0.0:
+            leaderless.hear_pair(sees, params, memory, o, text, message.PAIRS)
 
 
 @inline
 def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[no-untyped-def]
     text = writes.outbox
-    number = int(sees.number[0])
-    text[message.WHO] = number | int(memory[M.session]) << 4
-    message.put16(text, message.COUNT, now.step & 0xFFFF)
-    team = 0 if holding else 1 << number
-    for j in range(MOST):
-        team |= int(memory[M.peers + WIDTH * j + Q.inside]) << j
-    message.put16(text, message.TEAM, message.NOBODY if leaves else team)
+    leaderless.begin_message(now, sees, memory, text, holding, leaves)
     turn = _in_frame(memory, M.turn_steady)
     wish_unit, share_unit, moment_unit = params[P.wish_unit], params[P.share_unit], params[P.moment_unit]  # fmt: skip
     for k in range(3):
@@ -163,20 +141,8 @@ def _speak(now, sees, params, memory, writes, holding, leaves):  # type: ignore[
         memory[M.said + k] = wish_unit * numbers.get(text, at)
         memory[M.said + 3 + k] = share_unit * numbers.get(text, share)
         memory[M.said_turn + k] = moment_unit * message.get_moment(text, k)
-    j = leaderless._next_peer(memory, int(memory[M.turn]))
-    if j < 0:
-        message.put_pair(text, message.PAIRS, number, 0, 0, 0, 0, 0, 0)
-    else:
-        memory[M.turn] = j
-        o = M.peers + WIDTH * j
-        memory[o + Q.due] = 0.0
-        first = 1 if memory[o + Q.state] == FIRST else 0
-        message.put_pair(
-            text, message.PAIRS, j, int(memory[o + Q.version]), first, int(memory[o + Q.seen]),
-            int(memory[o + Q.yes]), int(memory[o + Q.session]), int(memory[o + Q.code]),
-        )  # fmt: skip
-    key_0, key_1 = int(params[P.key]), int(params[P.key + 1])
-    message.seal(text, (now.step >> 16) & 0xFFFFFFFF, key_0, key_1)
+    leaderless.speak_to_next(sees, memory, text, message.PAIRS)
+    leaderless.seal(now, params, text)
 
 
 @inline
@@ -356,6 +322,7 @@ def _agree_on_wrench(now, sees, params, memory, writes):  # type: ignore[no-unty
     _take(memory, M.turn_wish, sees.wish_moment, twist)
     _take(memory, M.turn_steady, sees.steady_moment, twist)
 
+    _know(sees, params, memory, me, n)
     _listen(now, sees, params, memory, me, n)
     late = params[P.patience] / dt
     team = 1
@@ -363,11 +330,10 @@ def _agree_on_wrench(now, sees, params, memory, writes):  # type: ignore[no-unty
         team += int(memory[M.peers + WIDTH * j + Q.inside])
     if started:
         _weigh(sees, params, memory, sees.reference, n, team, late, dt)
-    for k in range(
-        3
-    ):  # what the view makes of them is of no use here: the plan tells each its share
+    # What the view makes of them is of no use here: the plan tells each its share.
+    for k in range(3):
         memory[M.mean + k] = memory[M.b + k] = 0.0
-    leaderless._view(sees, memory, me, n, team, late, started)
+    leaderless.view_team(sees, memory, me, n, team, late, started)
     mx, my, mz, holding, others = _mean_wish(memory, late)
 
     count, place = _gather(sees, params, memory, me, n)
@@ -387,8 +353,8 @@ def _agree_on_wrench(now, sees, params, memory, writes):  # type: ignore[no-unty
         hx = hy = hz = x = y = z = size = 0.0
     elif size > 1e-9:
         turn = params[P.rate] * dt
-        leaderless._move(memory, params, x / size, y / size, z / size, turn)
-        leaderless._offer(memory, params, x / size, y / size, z / size)
+        leaderless.move(memory, params, x / size, y / size, z / size, turn)
+        leaderless.offer(memory, params, x / size, y / size, z / size)
     row, o = P.rows + P.width * me, M.a
     along = x * memory[o] + y * memory[o + 1] + z * memory[o + 2]
     T = min(max(along, params[row + P.low]), params[row + P.high])
@@ -418,7 +384,7 @@ def _agree_on_wrench(now, sees, params, memory, writes):  # type: ignore[no-unty
 Distance = Annotated[float, Field(ge=0.0, le=100.0)]
 
 
-class LeaderlessWrench(AgentPart):
+class LeaderlessWrench(Speaking):
     """Each drone bears its row of a formation that all know, corrected to the wanted force and moment, inside of planes agreed with each other drone.
 
     Planes keep drones and cables metres apart. No allocator is asked: the answer is that of ``safe-wrench`` where no limit stands in the way, and what a drone's own limit leaves of it the
@@ -428,8 +394,7 @@ class LeaderlessWrench(AgentPart):
     kernel = _agree_on_wrench
     remembers = MEMORY
     wrenches = True
-    per_drone = ("tension_min", "tension_max")
-    from_team: ClassVar[Mapping[str, float | None]] = {"tension_min": 0.05, "tension_max": 5.0}
+    least_share = 0.15
 
     cone_deg: Annotated[float, Field(ge=1.0, lt=75.0)] = SPREAD
     """Angle of the plan's cables from the vertical in hover, degrees, where the flight plans no formation."""
@@ -444,23 +409,9 @@ class LeaderlessWrench(AgentPart):
     """Largest angle between a cable and the wanted load's upright axis, degrees."""
     max_rate: Annotated[float, Field(gt=0.0, le=1e3)] = 3.0
     """Fastest turn of a cable's direction in the frame of the wanted load, rad/s."""
-    tension_min: Force | list[Force] | None = None
-    """Least tension, N; one value, or one per cable. None: 0.15 of a cable's share of the load's weight where
-    ``drones.max_thrust`` is known, else 0.05."""
-    tension_max: Force | list[Force] | None = None
-    """Largest tension, N; one value, or one per cable. None: what 0.95 of ``drones.max_thrust`` lifts beside the drone,
-    or 5."""
-    patience: Annotated[float, Field(gt=0.0, le=10.0)] = 0.15
-    """Time after which somebody who is not heard is taken for silent, s."""
-    stale: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    """Age, by the own clock, from which on a message is not heard, s: more than clocks differ by."""
-    key: Annotated[str, Field(pattern="^[0-9a-f]{16}$")] = "0" * 16
-    """Secret of the team, 16 hexadecimal digits: a message without its seal is not heard."""
 
     def check(self, team: Team) -> list[tuple[str, str]]:
         found = super().check(team)
-        if team.n > MOST:
-            found.append(("kind", f"is for {MOST} drones at most"))
         if team.body is None:
             found.append(("kind", 'shares force and moment of a rigid load: a point needs "leaderless"'))  # fmt: skip
         return found
@@ -478,15 +429,6 @@ class LeaderlessWrench(AgentPart):
                 f"drones start {nearest:.3g} m apart (start): they are led apart first",
             )
 
-    def left_open(self, team: Team) -> dict[str, Vector]:
-        known = np.isfinite(team.max_thrusts)
-        low = 0.15 * team.load_mass * max(team.gravity, 1e-3) / team.n
-        lifts = 0.95 * team.max_thrusts - team.masses * team.gravity
-        return {
-            "tension_min": np.where(known, low, math.nan),
-            "tension_max": np.where(known, np.maximum(lifts, 1.2 * low), math.nan),
-        }
-
     def _gap(self, team: Team) -> float:
         i, j = np.triu_indices(team.n, k=1)
         nearest = np.linalg.norm(team.levers[i] - team.levers[j], axis=1).min(initial=math.inf)
@@ -502,7 +444,7 @@ class LeaderlessWrench(AgentPart):
             team.n, g=team.gravity, least=0.5 * distance, cone=math.cos(math.radians(self.max_cone_deg)), rate=self.max_rate,
             settling=0.0, patience=self.patience, stale=self.stale, period=0.0,
             wish_unit=WISHES * weight / numbers.MOST, share_unit=leaderless.SHARES * weight / numbers.MOST,
-            key=(int(self.key[8:], 16), int(self.key[:8], 16)), m=team.load_mass, moment_unit=MOMENTS * weight * arm / message.LARGEST,
+            key=self.secret, m=team.load_mass, moment_unit=MOMENTS * weight * arm / message.LARGEST,
             gap=0.5 * self._gap(team), kind=kind, axis=axis,
             low=self.settled("tension_min", team), high=self.settled("tension_max", team),
             length=team.cable_lengths, arm=team.levers, plan=shares(team, *formation),
